@@ -1,0 +1,65 @@
+"""The one check of arrays at the public boundary, and read-only arrays for frozen data."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from boom_model.errors import InputError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def read_only(values: ArrayLike) -> Array:
+    """A float64 copy that cannot be written to."""
+    array = np.array(values, dtype=float)
+    array.flags.writeable = False
+    return array
+
+
+def checked(name: str, values: ArrayLike, last: int | None = None) -> Array:
+    """`values` as float64 of shape (..., last), all finite.
+
+    Args:
+        name: what the message calls it.
+        last: required length of the last axis; None accepts any shape.
+
+    Raises:
+        InputError: not numbers, wrong last axis, NaN or infinite; names the first offending index.
+    """
+    try:
+        array: Array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} is not an array of numbers: {error}") from None
+    if last is not None and (array.ndim == 0 or array.shape[-1] != last):
+        raise InputError(f"{name} has shape {array.shape}; its last axis must have length {last}")
+    if not np.isfinite(array).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        where = f"{name}[{', '.join(map(str, index))}]" if index else name
+        raise InputError(f"{where} is {array[index]}; it must be a finite number")
+    return array
+
+
+def scalar(name: str, value: ArrayLike) -> float:
+    """`value` as one finite number.
+
+    Raises:
+        InputError: not a number, not finite, or more than one; names it.
+    """
+    array = checked(name, value)
+    if array.shape != ():
+        raise InputError(f"{name} has shape {array.shape}; it must be one number")
+    return float(array)
+
+
+def broadcast(**named: ArrayLike) -> tuple[Array, ...]:
+    """The named joint arrays, each checked as (..., 5), broadcast to one shape.
+
+    Raises:
+        InputError: as `checked`, or shapes that do not broadcast.
+    """
+    arrays = [checked(name, values, 5) for name, values in named.items()]
+    try:
+        return tuple(np.broadcast_arrays(*arrays))
+    except ValueError:
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(named, arrays, strict=True))
+        raise InputError(f"shapes do not match: {shapes}") from None

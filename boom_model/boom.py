@@ -1,0 +1,170 @@
+"""The boom: geometry, bodies, joint limits, payload and drives as frozen data."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, checked, read_only, scalar
+from boom_model.drives import Drive
+from boom_model.errors import InputError
+from boom_model.provenance import Origin
+
+JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
+"""Joint names, in the order of q: theta1 .. theta5 of the thesis."""
+
+IS_LENGTH = read_only([0, 0, 0, 1, 0]).astype(bool)
+"""True where a joint coordinate is a length [m] and not an angle [rad]."""
+
+MOVING_BODIES = ("lower", "inner", "outer", "upper", "extension", "end_effector")
+"""Bodies that move against the yawing base; the payload is a point mass at the tip."""
+
+LIMIT_TOLERANCE = 1e-9
+"""Slack [rad or m] of every comparison with a position limit: rounding is not a violation."""
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Lengths [m] of the thesis's figure 2-1. L5 = L3 and L9 = L4: the linkage is a parallelogram."""
+
+    L1: float
+    L2: float
+    L3: float
+    L4: float
+    L6: float
+    L7: float
+    L8: float
+
+    @property
+    def L5(self) -> float:
+        return self.L3
+
+    @property
+    def L9(self) -> float:
+        return self.L4
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Rigid body in its own frame of the DH tables (`frames.BODY_FRAMES`)."""
+
+    mass: float
+    com: Array
+    """(3,) centre of mass in the body's frame [m]."""
+    inertia: Array
+    """(3, 3) about the centre of mass, along the axes of the body's frame [kg m^2]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Joint limits, arrays of shape (5,) in rad, rad/s, ... (m, m/s, ... for the extension)."""
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    linkage: float
+    """Coupled limit: theta3 - theta2 may not fall below this [rad]."""
+    origins: Mapping[str, tuple[Origin, ...]]
+    """Origin of every figure: keys position, velocity, acceleration and jerk (5 each), linkage (1)."""
+
+    def excess(self, q: ArrayLike) -> Array:
+        """How far q is outside each position limit, shape (..., 6); negative inside.
+
+        The last entry is the coupled limit, theta2 + linkage - theta3. Entries in rad, the extension's in m.
+        """
+        q = np.asarray(q, dtype=float)
+        coupled = q[..., 1:2] + self.linkage - q[..., 2:3]
+        return np.concatenate([np.maximum(self.lower - q, q - self.upper), coupled], axis=-1)
+
+    def hold(self, q: ArrayLike) -> Array:
+        """Whether q (..., 5) is within every position limit, to LIMIT_TOLERANCE; bool of shape (...)."""
+        return np.asarray((self.excess(q) <= LIMIT_TOLERANCE).all(axis=-1))
+
+    def reasons(self, q: ArrayLike) -> list[str]:
+        """One sentence for each position limit that q (5,) breaks: which, by how much, and the bound."""
+        q = checked("q", q, 5)
+        sentences = []
+        for i in map(int, np.flatnonzero(self.excess(q)[:5] > LIMIT_TOLERANCE)):
+            below = q[i] < self.lower[i]
+            bound = self.lower[i] if below else self.upper[i]
+            sentences.append(
+                f"{JOINTS[i]} {_shown(i, q[i])} is {_shown(i, abs(q[i] - bound))} {'below' if below else 'above'} "
+                f"its limit of {_shown(i, bound)}"
+            )
+        gap = q[2] - q[1]
+        if self.linkage - gap > LIMIT_TOLERANCE:
+            sentences.append(
+                f"lower - inner = {_shown(2, gap)} is {_shown(2, self.linkage - gap)} below "
+                f"the linkage's coupled limit of {_shown(2, self.linkage)}"
+            )
+        return sentences
+
+
+@dataclass(frozen=True, eq=False)
+class Boom:
+    """A five-joint boom on a parallelogram linkage."""
+
+    name: str
+    geometry: Geometry
+    bodies: Mapping[str, Body]
+    """base, and each of MOVING_BODIES."""
+    payload: float
+    """Mass at the tip [kg]."""
+    limits: Limits
+    drives: tuple[Drive | None, ...]
+    """One a joint; None where no drive is given, and then nothing about it can be checked."""
+    poses: Mapping[str, Array]
+    """Named joint positions, each (5,)."""
+    gravity: float = 9.81
+    """[m/s^2]"""
+
+    @staticmethod
+    def load(path: str | Path | None = None, catalogue: str | Path | None = None) -> "Boom":
+        """The third-generation boom (thesis, Appendix C and table 2-3), or one described by a TOML file of the same form.
+
+        Args:
+            path: a boom's TOML file; None is the shipped `boom_model/data/third_generation.toml`.
+            catalogue: the TOML file its drives are named in; None is the shipped one.
+
+        Raises:
+            InputError: the file cannot be read, is malformed, or names unknown keys or drives; the key is named.
+        """
+        from boom_model.boom_file import read_boom
+
+        return read_boom(path, catalogue)
+
+    def with_payload(self, mass: float) -> "Boom":
+        """The same boom with another payload [kg].
+
+        Raises:
+            InputError: not finite, or negative.
+        """
+        mass = scalar("payload", mass)
+        if mass < 0:
+            raise InputError(f"payload is {mass} kg; it must be at least 0 kg")
+        return replace(self, payload=mass)
+
+    def pose(self, name: str) -> Array:
+        """The named pose, (5,).
+
+        Raises:
+            InputError: no such pose; lists those there are.
+        """
+        try:
+            return self.poses[name]
+        except KeyError:
+            raise InputError(f"unknown pose {name!r}; there are: {', '.join(sorted(self.poses))}") from None
+
+    @cached_property
+    def mass(self) -> float:
+        """Total mass without payload [kg]."""
+        return sum(body.mass for body in self.bodies.values())
+
+
+def _shown(joint: int, value: float) -> str:
+    return f"{value:.6g} m" if IS_LENGTH[joint] else f"{np.degrees(value):.6g} deg"

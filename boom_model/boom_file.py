@@ -1,0 +1,233 @@
+"""The TOML form of a boom: schema, validation, and conversion to SI."""
+
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, Generic, Literal, TypeVar
+
+import numpy as np
+from pydantic import AfterValidator, Field, model_validator
+
+from boom_model.arrays import Array, checked, read_only
+from boom_model.boom import JOINTS, MOVING_BODIES, Body, Boom, Geometry, Limits
+from boom_model.catalogue import CATALOGUE_FILE, Catalogue
+from boom_model.drives import Drive, Wiring
+from boom_model.errors import InputError
+from boom_model.provenance import Basis, Origin, Sourced
+from boom_model.toml_file import Finite, NonNegative, Positive, Table, read_toml
+
+BOOM_FILE = Path(str(files("boom_model") / "data" / "third_generation.toml"))
+
+V = TypeVar("V")
+BasisName = Literal["printed", "estimated", "assumed"]
+Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+
+
+def _inertia(value: Any) -> Array:
+    """The tensor of [Ixx, Iyy, Izz] or of a 3 x 3 matrix, as a body can have it."""
+    try:
+        given = checked("inertia", value)
+    except InputError:
+        given = np.empty(0)
+    if given.shape not in ((3,), (3, 3)) or isinstance(value, str):
+        raise ValueError(f"must be [Ixx, Iyy, Izz] or a 3 x 3 matrix, of finite numbers (it is {value})")
+    tensor = read_only(np.diag(given) if given.ndim == 1 else given)
+    if not np.allclose(tensor, tensor.T, rtol=1e-12, atol=0.0):
+        raise ValueError("the inertia must be symmetric")
+    principal = np.linalg.eigvalsh(tensor)
+    if principal[0] < 0 or principal[0] + principal[1] < principal[2] * (1 - 1e-9):
+        shown = ", ".join(f"{p:.6g}" for p in principal)
+        raise ValueError(f"no body has principal inertias {shown}: the two smaller ones must sum to the largest or more")
+    return tensor
+
+
+class _Origin(Table):
+    basis: BasisName
+    source: str
+
+    @property
+    def origin(self) -> Origin:
+        return Origin(Basis(self.basis), self.source)
+
+
+class _Sourced(_Origin, Generic[V]):
+    value: V
+
+    @property
+    def sourced(self) -> Sourced[V]:
+        return Sourced(self.value, self.origin)
+
+
+class _Range(_Origin):
+    lower: Finite
+    upper: Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "_Range":
+        if self.lower > self.upper:
+            raise ValueError(f"lower {self.lower} is above upper {self.upper}")
+        return self
+
+
+class _GeometryTable(Table):
+    L1_m: Finite
+    L2_m: Finite
+    L3_m: Positive
+    L4_m: Positive
+    L6_m: Finite
+    L7_m: Positive
+    L8_m: NonNegative
+
+
+class _BodyTable(Table):
+    mass_kg: NonNegative
+    com_m: Triple
+    inertia_kg_m2: Annotated[Any, AfterValidator(_inertia)]
+
+
+class _DriveTable(Table):
+    motor: str
+    gearbox: str
+    bus_voltage_V: _Sourced[Positive] | None = None
+    wiring: _Sourced[Literal["parallel", "series"]] | None = None
+
+
+class _RevoluteTable(Table):
+    position_deg: _Range
+    velocity_deg_s: _Sourced[Positive]
+    acceleration_deg_s2: _Sourced[Positive]
+    jerk_deg_s3: _Sourced[Positive]
+    drive: _DriveTable | None = None
+
+    @property
+    def rows(self) -> tuple[_Range, _Sourced[float], _Sourced[float], _Sourced[float], float]:
+        """Position, velocity, acceleration, jerk, and the factor that makes them SI."""
+        unit = np.pi / 180.0
+        return self.position_deg, self.velocity_deg_s, self.acceleration_deg_s2, self.jerk_deg_s3, unit
+
+
+class _PrismaticTable(Table):
+    position_m: _Range
+    velocity_m_s: _Sourced[Positive]
+    acceleration_m_s2: _Sourced[Positive]
+    jerk_m_s3: _Sourced[Positive]
+
+    @property
+    def rows(self) -> tuple[_Range, _Sourced[float], _Sourced[float], _Sourced[float], float]:
+        return self.position_m, self.velocity_m_s, self.acceleration_m_s2, self.jerk_m_s3, 1.0
+
+
+class _JointsTable(Table):
+    yaw: _RevoluteTable
+    inner: _RevoluteTable
+    lower: _RevoluteTable
+    extension: _PrismaticTable
+    wrist: _RevoluteTable
+
+
+class _BodiesTable(Table):
+    base: _BodyTable
+    lower: _BodyTable
+    inner: _BodyTable
+    outer: _BodyTable
+    upper: _BodyTable
+    extension: _BodyTable
+    end_effector: _BodyTable
+
+
+class _LinkageTable(Table):
+    minimum_angle_deg: _Sourced[NonNegative]
+
+
+class _PayloadTable(_Origin):
+    mass_kg: NonNegative
+
+
+class _PoseTable(Table):
+    yaw_deg: Finite
+    inner_deg: Finite
+    lower_deg: Finite
+    extension_m: Finite
+    wrist_deg: Finite
+
+
+class _BoomTable(Table):
+    name: str
+    gravity_m_s2: NonNegative = 9.81
+    geometry: _GeometryTable
+    bodies: _BodiesTable
+    payload: _PayloadTable
+    joints: _JointsTable
+    linkage: _LinkageTable
+    poses: dict[str, _PoseTable] = Field(default_factory=dict)
+
+
+def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
+    """See `Boom.load`."""
+    file = Path(path) if path is not None else BOOM_FILE
+    table = read_toml(file, _BoomTable)
+    known = Catalogue.load(catalogue)
+    joints = [getattr(table.joints, joint) for joint in JOINTS]
+    g = table.geometry
+    return Boom(
+        name=table.name,
+        gravity=table.gravity_m_s2,
+        geometry=Geometry(L1=g.L1_m, L2=g.L2_m, L3=g.L3_m, L4=g.L4_m, L6=g.L6_m, L7=g.L7_m, L8=g.L8_m),
+        bodies=MappingProxyType({name: _body(getattr(table.bodies, name)) for name in ("base", *MOVING_BODIES)}),
+        payload=table.payload.mass_kg,
+        limits=_limits(joints, table.linkage.minimum_angle_deg),
+        drives=tuple(
+            _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), known, catalogue)
+            for name, joint in zip(JOINTS, joints, strict=True)
+        ),
+        poses=MappingProxyType({name: _pose(pose) for name, pose in table.poses.items()}),
+    )
+
+
+def _body(table: _BodyTable) -> Body:
+    return Body(table.mass_kg, read_only(table.com_m), table.inertia_kg_m2)
+
+
+def _limits(joints: list[Any], linkage: _Sourced[float]) -> Limits:
+    position, velocity, acceleration, jerk, unit = zip(*(joint.rows for joint in joints), strict=True)
+    rates = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
+    return Limits(
+        lower=read_only([p.lower * u for p, u in zip(position, unit, strict=True)]),
+        upper=read_only([p.upper * u for p, u in zip(position, unit, strict=True)]),
+        linkage=linkage.value * np.pi / 180.0,
+        **{name: read_only([r.value * u for r, u in zip(row, unit, strict=True)]) for name, row in rates.items()},
+        origins=MappingProxyType(
+            {
+                "position": tuple(p.origin for p in position),
+                "linkage": (linkage.origin,),
+                **{name: tuple(r.origin for r in row) for name, row in rates.items()},
+            }
+        ),
+    )
+
+
+def _drive(file: Path, key: str, table: _DriveTable | None, known: Catalogue, catalogue: str | Path | None) -> Drive | None:
+    if table is None:
+        return None
+    for kind, name, entries in (("motor", table.motor, known.motors), ("gearbox", table.gearbox, known.gearboxes)):
+        if name not in entries:
+            listed = ", ".join(entries) or "none"
+            raise InputError(f"{file}: key {key}.{kind}: {name!r} is not in {catalogue or CATALOGUE_FILE.name} ({listed})")
+    motor = known.motors[table.motor]
+    voltage = table.bus_voltage_V
+    if voltage is not None and motor.max_voltage is not None and voltage.value > motor.max_voltage:
+        raise InputError(
+            f"{file}: key {key}.bus_voltage_V: {voltage.value:g} V is above the {motor.max_voltage:g} V of {motor.name}"
+        )
+    wiring = table.wiring
+    return Drive(
+        motor=motor,
+        gearbox=known.gearboxes[table.gearbox],
+        bus_voltage=None if voltage is None else voltage.sourced,
+        wiring=None if wiring is None else Sourced(Wiring(wiring.value), wiring.origin),
+    )
+
+
+def _pose(table: _PoseTable) -> Array:
+    degrees = np.radians([table.yaw_deg, table.inner_deg, table.lower_deg, table.wrist_deg])
+    return read_only([*degrees[:3], table.extension_m, degrees[3]])

@@ -1,0 +1,133 @@
+"""The catalogue of motors and gearboxes: a TOML file in the datasheets' units, read into SI."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from boom_model.drives import Gearbox, Motor, Winding
+from boom_model.toml_file import Positive, Table, read_toml
+
+CATALOGUE_FILE = Path(str(files("boom_model") / "data" / "catalogue.toml"))
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """Motors and gearboxes by model name."""
+
+    motors: Mapping[str, Motor]
+    gearboxes: Mapping[str, Gearbox]
+
+    @staticmethod
+    def load(path: str | Path | None = None) -> "Catalogue":
+        """The shipped catalogue (thesis, Appendix E), or one of the same form.
+
+        Raises:
+            InputError: the file cannot be read, or breaks the form; names the file and the key.
+        """
+        table = read_toml(Path(path) if path is not None else CATALOGUE_FILE, _CatalogueTable)
+        return Catalogue(
+            motors=MappingProxyType({name: _motor(name, t) for name, t in table.motors.items()}),
+            gearboxes=MappingProxyType({name: _gearbox(name, t) for name, t in table.gearboxes.items()}),
+        )
+
+
+class _WindingTable(Table):
+    current_A: Positive
+    resistance_ohm: Positive
+    inductance_mH: Positive
+
+
+class _MotorTable(Table):
+    source: str
+    step_deg: Positive
+    max_voltage_V: Positive | None = None
+    holding_torque_Nm: Positive | None = None
+    running_torque_Nm: Positive | None = None
+    mass_kg: Positive | None = None
+    rotor_inertia_kg_cm2: Positive | None = None
+    parallel: _WindingTable | None = None
+    series: _WindingTable | None = None
+
+
+class _GearboxTable(Table):
+    source: str
+    ratio: Positive
+    continuous_torque_Nm: Positive | None = None
+    start_stop_torque_Nm: Positive | None = None
+    max_average_torque_Nm: Positive | None = None
+    peak_torque_Nm: Positive | None = None
+    efficiency_percent: Annotated[float, Field(gt=0, le=100)] | None = None
+    no_load_input_torque_Nm: Positive | None = None
+    starting_torque_Nm: Positive | None = None
+    backdrive_torque_Nm: Positive | None = None
+    mass_kg: Positive | None = None
+    input_inertia_kg_m2: Positive | None = None
+    torsion_T1_Nm: Positive | None = None
+    torsion_T2_Nm: Positive | None = None
+    torsion_K1_Nm_per_mrad: Positive | None = None
+    torsion_K2_Nm_per_mrad: Positive | None = None
+    torsion_K3_Nm_per_mrad: Positive | None = None
+    backlash_mrad: Positive | None = None
+    hysteresis_mrad: Positive | None = None
+    max_input_speed_rpm: Positive | None = None
+
+
+class _CatalogueTable(Table):
+    motors: dict[str, _MotorTable] = Field(default_factory=dict)
+    gearboxes: dict[str, _GearboxTable] = Field(default_factory=dict)
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor
+
+
+def _winding(table: _WindingTable | None) -> Winding | None:
+    if table is None:
+        return None
+    return Winding(table.current_A, table.resistance_ohm, table.inductance_mH * 1e-3)
+
+
+def _motor(name: str, t: _MotorTable) -> Motor:
+    return Motor(
+        name=name,
+        source=t.source,
+        step=float(np.radians(t.step_deg)),
+        max_voltage=t.max_voltage_V,
+        holding_torque=t.holding_torque_Nm,
+        running_torque=t.running_torque_Nm,
+        mass=t.mass_kg,
+        rotor_inertia=_scaled(t.rotor_inertia_kg_cm2, 1e-4),
+        parallel=_winding(t.parallel),
+        series=_winding(t.series),
+    )
+
+
+def _gearbox(name: str, t: _GearboxTable) -> Gearbox:
+    torques = (t.torsion_T1_Nm, t.torsion_T2_Nm)
+    stiffness = tuple(_scaled(k, 1e3) for k in (t.torsion_K1_Nm_per_mrad, t.torsion_K2_Nm_per_mrad, t.torsion_K3_Nm_per_mrad))
+    return Gearbox(
+        name=name,
+        source=t.source,
+        ratio=t.ratio,
+        continuous_torque=t.continuous_torque_Nm,
+        start_stop_torque=t.start_stop_torque_Nm,
+        max_average_torque=t.max_average_torque_Nm,
+        peak_torque=t.peak_torque_Nm,
+        efficiency=_scaled(t.efficiency_percent, 0.01),
+        no_load_input_torque=t.no_load_input_torque_Nm,
+        starting_torque=t.starting_torque_Nm,
+        backdrive_torque=t.backdrive_torque_Nm,
+        mass=t.mass_kg,
+        input_inertia=t.input_inertia_kg_m2,
+        torsion_torques=None if None in torques else torques,  # type: ignore[arg-type]
+        torsion_stiffness=None if None in stiffness else stiffness,  # type: ignore[arg-type]
+        backlash=_scaled(t.backlash_mrad, 1e-3),
+        hysteresis=_scaled(t.hysteresis_mrad, 1e-3),
+        max_input_speed=_scaled(t.max_input_speed_rpm, 2.0 * np.pi / 60.0),
+    )

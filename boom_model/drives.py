@@ -1,0 +1,236 @@
+"""Motor, gearbox and drive: what their datasheets allow, and what a joint torque asks of them."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array
+from boom_model.provenance import Origin, Sourced
+
+
+class Wiring(StrEnum):
+    """How the two halves of each phase of an 8-lead stepper are joined."""
+
+    PARALLEL = "parallel"
+    SERIES = "series"
+
+
+STEPPER_MARGIN = 0.5
+"""(available - required) / required that a stepper's torque should keep: the field's rule of thumb for pull-out."""
+
+
+@dataclass(frozen=True)
+class Winding:
+    """Electrical data of a motor in one wiring."""
+
+    current: float
+    """Phase current [A, rms]."""
+    resistance: float
+    """Phase resistance [ohm]."""
+    inductance: float
+    """Phase inductance [H]."""
+
+
+@dataclass(frozen=True)
+class Motor:
+    """Hybrid stepper. None stands for what the datasheet does not print."""
+
+    name: str
+    source: str
+    step: float
+    """Full step [rad]."""
+    max_voltage: float | None
+    holding_torque: float | None
+    running_torque: float | None
+    """Torque while turning slowly [Nm]."""
+    mass: float | None
+    rotor_inertia: float | None
+    """[kg m^2]"""
+    parallel: Winding | None
+    series: Winding | None
+
+
+@dataclass(frozen=True)
+class Gearbox:
+    """Strain-wave gearbox, torques at the output unless said otherwise. None stands for what is not printed."""
+
+    name: str
+    source: str
+    ratio: float
+    continuous_torque: float | None
+    start_stop_torque: float | None
+    max_average_torque: float | None
+    peak_torque: float | None
+    efficiency: float | None
+    """Share of the input power that leaves, 0 to 1."""
+    no_load_input_torque: float | None
+    starting_torque: float | None
+    backdrive_torque: float | None
+    mass: float | None
+    input_inertia: float | None
+    """[kg m^2] at the input."""
+    torsion_torques: tuple[float, float] | None
+    """T1, T2 [Nm]: where the stiffness changes."""
+    torsion_stiffness: tuple[float, float, float] | None
+    """K1, K2, K3 [Nm/rad]."""
+    backlash: float | None
+    """[rad]"""
+    hysteresis: float | None
+    """[rad]"""
+    max_input_speed: float | None
+    """[rad/s] at the input."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A motor on a gearbox, as it is wired and fed. Without voltage or wiring only low speed can be judged."""
+
+    motor: Motor
+    gearbox: Gearbox
+    bus_voltage: Sourced[float] | None
+    wiring: Sourced[Wiring] | None
+
+    @property
+    def winding(self) -> Winding | None:
+        """The motor's data in the wiring chosen; None where either is not given."""
+        if self.wiring is None:
+            return None
+        return self.motor.parallel if self.wiring.value is Wiring.PARALLEL else self.motor.series
+
+    @property
+    def supply_origins(self) -> tuple[Origin, ...]:
+        """Origins of bus voltage and wiring, as far as they are given."""
+        return tuple(s.origin for s in (self.bus_voltage, self.wiring) if s is not None)
+
+
+def reflected_inertia(drive: Drive) -> float | None:
+    """N^2 (J_rotor + J_gear) [kg m^2] at the joint; None where a datasheet lacks one of them."""
+    rotor, gear = drive.motor.rotor_inertia, drive.gearbox.input_inertia
+    if rotor is None or gear is None:
+        return None
+    return drive.gearbox.ratio**2 * (rotor + gear)
+
+
+def available_torque(drive: Drive, speed: ArrayLike) -> Array | None:
+    """Motor torque that the torque-speed curve leaves at `speed` [rad/s], in Nm, shape of `speed`.
+
+        T = T_run min(1, V / sqrt((R I_p + K_m w)^2 + (p w L I_p)^2)),  I_p = sqrt(2) I,  K_m = T_run / I_p,
+
+    p = 50 for a 1.8 degree step (pole pairs: a quarter of the steps in a turn). The datasheet's curve is a picture, so this
+    is an estimate of our own: it leaves out iron loss, detent and resonance. None without voltage, wiring or motor data.
+    """
+    terms = _curve_terms(drive)
+    if terms is None or drive.motor.running_torque is None:
+        return None
+    voltage, resistive, back_emf, reactive = terms
+    w = np.abs(np.asarray(speed, dtype=float))
+    needed = np.hypot(resistive + back_emf * w, reactive * w)
+    available: Array = drive.motor.running_torque * np.minimum(1.0, voltage / needed)
+    return available
+
+
+def speed_for_torque(drive: Drive, torque: ArrayLike) -> Array | None:
+    """Highest motor speed [rad/s] at which `available_torque` is at least `torque` [Nm], shape of `torque`.
+
+    Solves (R I_p + K_m w)^2 + (p w L I_p)^2 = (V T_run / T)^2, a quadratic in w. For T = T_run this is the corner speed; it
+    is 0 where no speed gives the torque and infinite where none is asked. None without voltage, wiring or motor data.
+    """
+    terms, running = _curve_terms(drive), drive.motor.running_torque
+    if terms is None or running is None:
+        return None
+    return _speed_on_curve(terms, running, np.asarray(torque, dtype=float))
+
+
+def _speed_on_curve(terms: tuple[float, float, float, float], running: float, torque: Array) -> Array:
+    voltage, resistive, back_emf, reactive = terms
+    with np.errstate(divide="ignore"):
+        level = np.where(torque > running, 0.0, voltage * running / np.maximum(torque, 0.0))
+    a, half_b = back_emf**2 + reactive**2, resistive * back_emf
+    c = np.minimum(resistive**2 - level**2, 0.0)
+    speed: Array = (np.sqrt(half_b**2 - a * c) - half_b) / a
+    return speed
+
+
+def _curve_terms(drive: Drive) -> tuple[float, float, float, float] | None:
+    winding, motor = drive.winding, drive.motor
+    if winding is None or drive.bus_voltage is None or motor.running_torque is None:
+        return None
+    peak_current = np.sqrt(2.0) * winding.current
+    pole_pairs = 2.0 * np.pi / motor.step / 4.0
+    return (
+        drive.bus_voltage.value,
+        float(winding.resistance * peak_current),
+        float(motor.running_torque / peak_current),
+        float(pole_pairs * winding.inductance * peak_current),
+    )
+
+
+def motor_torque(drive: Drive, tau: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array | None:
+    """Torque at the motor [Nm] for joint torque `tau` [Nm] at `qd` [rad/s] and `qdd` [rad/s^2]; signed like `tau`.
+
+        driving (tau qd > 0):  tau / (N eta) + sign(qd) T_noload + (J_rotor + J_gear) N qdd
+        braking or holding:    tau / N                           + (J_rotor + J_gear) N qdd
+
+    The no-load torque is added to the efficiency's loss, the conservative reading of the sheet; friction earns no credit
+    while braking (our own derivation, in the manner of Harmonic Drive's selection pages). None where a figure is missing.
+    """
+    gear, inertia = drive.gearbox, reflected_inertia(drive)
+    if gear.efficiency is None or gear.no_load_input_torque is None or inertia is None:
+        return None
+    tau, qd, qdd = (np.asarray(x, dtype=float) for x in (tau, qd, qdd))
+    driving = tau * qd > 0.0
+    loss = np.where(driving, tau * (1.0 / gear.efficiency - 1.0) / gear.ratio, 0.0)
+    drag = np.where(driving, np.sign(qd) * gear.no_load_input_torque, 0.0)
+    torque: Array = tau / gear.ratio + loss + drag + inertia / gear.ratio * qdd
+    return torque
+
+
+def drive_inertia(drive: Drive) -> float:
+    """What the drive's own inertia adds at the joint while driving: eta N^2 (J_rotor + J_gear) [kg m^2]; 0 if not given."""
+    return (drive.gearbox.efficiency or 1.0) * (reflected_inertia(drive) or 0.0)
+
+
+def drive_torque_limit(drive: Drive, speed: ArrayLike) -> Array | None:
+    """Joint torque [Nm] that a drive allows at a joint speed [rad/s], shape of `speed`; None where no figure limits it.
+
+        min(T_start_stop, (T_available(N speed) / (1 + margin) - T_noload) N eta)
+
+    bounds |tau + eta N^2 (J_rotor + J_gear) qdd|. Without voltage or wiring the running torque stands for the curve: then
+    the limit is necessary, not sufficient, above low speed.
+    """
+    gear, w = drive.gearbox, drive.gearbox.ratio * np.asarray(speed, dtype=float)
+    limits = [] if gear.start_stop_torque is None else [np.full_like(w, gear.start_stop_torque)]
+    curve = available_torque(drive, w)
+    motor = drive.motor.running_torque if curve is None else curve
+    if motor is not None and gear.efficiency is not None and gear.no_load_input_torque is not None:
+        spare = np.asarray(motor) / (1.0 + STEPPER_MARGIN) - gear.no_load_input_torque
+        limits.append(np.broadcast_to(np.maximum(spare, 0.0) * gear.ratio * gear.efficiency, w.shape))
+    if not limits:
+        return None
+    limit: Array = np.min(limits, axis=0)
+    return limit
+
+
+def drive_torque_tangent(drive: Drive, speed: ArrayLike) -> tuple[Array, Array] | None:
+    """Intercept [Nm] and slope [Nm s^2/rad^2] of a line in the square of the joint speed, below the drive's torque curve.
+
+    The motor's curve is a convex function of the speed squared beyond its corner, so its tangent at `speed` (or at the
+    corner, where that is faster) lies below it everywhere beyond, and with `drive_torque_limit` at rest as a second bound
+    it never allows more than the curve does. None without the figures that make a curve.
+    """
+    terms, gear = _curve_terms(drive), drive.gearbox
+    running = drive.motor.running_torque
+    if terms is None or gear.efficiency is None or gear.no_load_input_torque is None or running is None:
+        return None
+    voltage, resistive, back_emf, reactive = terms
+    corner = _speed_on_curve(terms, running, np.asarray(running))
+    w = np.maximum(np.maximum(gear.ratio * np.abs(np.asarray(speed, dtype=float)), corner), 1e-6)
+    needed = (resistive + back_emf * w) ** 2 + (reactive * w) ** 2
+    torque = running * voltage / np.sqrt(needed)
+    falls = -torque / (2.0 * needed) * (resistive * back_emf / w + back_emf**2 + reactive**2)
+    gain = gear.ratio * gear.efficiency / (1.0 + STEPPER_MARGIN)
+    slope = gain * falls * gear.ratio**2
+    at_tangent = gain * torque - gear.no_load_input_torque * gear.ratio * gear.efficiency
+    return at_tangent - slope * (w / gear.ratio) ** 2, slope

@@ -1,0 +1,99 @@
+"""The two Denavit-Hartenberg loops of the thesis, and the frame that each body is described in.
+
+Frame 1 is the base, frame 11 the tip; row i of a table takes frame i to frame i+1 (thesis, tables 2-1 and 2-2 with the
+corrections of rows 8 and 6). Transforms are named T_parent_child: a point's coordinates in the parent are T @ those in
+the child.
+"""
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, checked, read_only
+from boom_model.boom import Boom
+
+Loop = Literal["inner", "outer"]
+
+BODY_FRAMES: dict[str, tuple[Loop, int]] = {
+    "base": ("outer", 2),
+    "lower": ("outer", 5),
+    "inner": ("inner", 5),
+    "outer": ("outer", 6),
+    "upper": ("outer", 8),
+    "extension": ("outer", 9),
+    "end_effector": ("outer", 10),
+}
+"""The loop and the frame in which each body's centre of mass and inertia are given."""
+
+R_LINK_BODY = {
+    "base": read_only([[1, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "lower": read_only(np.eye(3)),
+    "inner": read_only(np.eye(3)),
+    "outer": read_only(np.eye(3)),
+    "upper": read_only([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
+    "extension": read_only([[0, 0, -1], [1, 0, 0], [0, -1, 0]]),
+    "end_effector": read_only([[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+}
+"""Rotation from a body's DH frame to its link axes (e, p, n): e at the link's angle from the arm's forward horizontal, p a
+quarter turn on, n the arm plane's normal. The link's angle is 0 for the base, theta2 for inner and outer, theta3 for lower,
+upper and extension, theta3 + theta5 for the end effector."""
+
+
+def dh_rows(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
+    """Rows (alpha_{i-1}, a_{i-1}, d_i, theta_i) of one loop, shape (..., 10, 4), in rad and m.
+
+    Args:
+        q: (..., 5) joint positions.
+        loop: "inner" (thesis, table 2-1) or "outer" (table 2-2).
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    q = checked("q", q, 5)
+    g = boom.geometry
+    t1, t2, t3, t4, t5 = np.moveaxis(q, -1, 0)
+    right, half = np.pi / 2.0, np.pi
+    a: tuple[float, ...]
+    theta: tuple[Any, ...]
+    if loop == "inner":
+        alpha = (0, 0, 0, right, 0, 0, 0, right, right, 0)
+        a = (0, 0, g.L2, 0, g.L9, 0, 0, g.L6, 0, g.L8)
+        theta = (t1, 0, 0, t2, t3 - t2 - right, 0, 0, half, t5, 0)
+    else:
+        alpha = (0, 0, 0, right, 0, 0, 0, right, right, 0)
+        a = (0, 0, g.L2, 0, g.L3, g.L4, g.L5, g.L6, 0, g.L8)
+        theta = (t1, 0, 0, t3, 2.0 * half - t3 + t2, half + t3 - t2, right, half, t5, 0)
+    d = (0, g.L1, 0, 0, 0, 0, 0, g.L7 + t4, 0, 0)
+    rows = np.empty((*q.shape[:-1], 10, 4))
+    for column, entries in enumerate((alpha, a, d, theta)):
+        for row, entry in enumerate(entries):
+            rows[..., row, column] = entry
+    return rows
+
+
+def frame_transforms(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
+    """T_1_i of every frame of one loop, shape (..., 11, 4, 4): entry [..., i-1, :, :] is T_1_i (thesis, eqs. 2.2 and 2.17).
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    alpha, a, d, theta = np.moveaxis(dh_rows(boom, q, loop), -1, 0)
+    ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
+    steps = np.zeros((*theta.shape, 4, 4))
+    steps[..., 0, :] = np.stack([ct, -st, np.zeros_like(ct), a], axis=-1)
+    steps[..., 1, :] = np.stack([st * ca, ct * ca, -sa, -sa * d], axis=-1)
+    steps[..., 2, :] = np.stack([st * sa, ct * sa, ca, ca * d], axis=-1)
+    steps[..., 3, 3] = 1.0
+    T = np.empty((*theta.shape[:-1], 11, 4, 4))
+    T[..., 0, :, :] = np.eye(4)
+    for i in range(10):
+        T[..., i + 1, :, :] = T[..., i, :, :] @ steps[..., i, :, :]
+    return T
+
+
+def body_transforms(boom: Boom, q: ArrayLike) -> dict[str, Array]:
+    """T_1_body of every body of `BODY_FRAMES`, and of the tip (frame 11), each (..., 4, 4)."""
+    loops = {loop: frame_transforms(boom, q, loop) for loop in ("inner", "outer")}
+    poses = {name: loops[loop][..., frame - 1, :, :] for name, (loop, frame) in BODY_FRAMES.items()}
+    return poses | {"tip": loops["outer"][..., 10, :, :]}

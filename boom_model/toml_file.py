@@ -1,0 +1,52 @@
+"""Reading a TOML file into a pydantic schema, with errors that name the file and the key."""
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from boom_model.errors import InputError
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class Table(BaseModel):
+    """A TOML table: no unknown keys, no numbers written as text."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+Schema = TypeVar("Schema", bound=Table)
+
+
+def read_toml(path: Path, schema: type[Schema]) -> Schema:
+    """The file as an instance of `schema`.
+
+    Raises:
+        InputError: the file cannot be read, is not TOML, or breaks the schema; every offending key is named.
+    """
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+    try:
+        return schema.model_validate(data)
+    except ValidationError as error:
+        raise InputError(f"{path}: " + "; ".join(_sentence(e) for e in error.errors())) from None
+
+
+def _sentence(error: ErrorDetails) -> str:
+    key = ".".join(str(part) for part in error["loc"])
+    if error["type"] == "missing":
+        return f"key {key} is missing"
+    if error["type"] == "extra_forbidden":
+        return f"key {key} is not known"
+    value = error["input"]
+    shown = f" (it is {value!r})" if isinstance(value, int | float | str) else ""
+    return f"key {key}: {error['msg'][0].lower()}{error['msg'][1:]}{shown}"

@@ -1,0 +1,331 @@
+"""A motion held against the joint limits and the drives' datasheets, row by row.
+
+Gearbox rows follow Harmonic Drive's selection procedure, applied to the Cone Drive CBG, whose maker's own procedure was not
+found. A figure that a datasheet does not give makes its row NOT CHECKABLE, never a pass.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from boom_model import JOINTS, Basis, Boom, Drive, Loads, Origin, inverse_dynamics
+from boom_model.arrays import Array
+from boom_model.boom import IS_LENGTH, LIMIT_TOLERANCE
+from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque, speed_for_torque
+from boom_model.dynamics import PayloadAs
+from planner.trajectory import Trajectory
+
+SAMPLING_SLACK = 1e-3
+"""A demand within 0.1 % of its limit is on it: a motion is seen at samples, and solvers end within a tolerance."""
+
+ESTIMATE_WARNING = 0.25
+"""A margin on an estimated or assumed figure that exceeds the required one by less than this is a WARN, not a PASS."""
+
+LOW_SPEED = 2.0 * np.pi
+"""Motor speed [rad/s] (60 rpm) up to which a sheet's running torque holds whatever the supply; our own choice."""
+
+_PROCEDURE = "Harmonic Drive's procedure, applied to another maker's gearbox"
+
+
+class Verdict(StrEnum):
+    """Of a row; a whole report is PASS, FAIL or INCOMPLETE."""
+
+    PASS = "PASS"
+    WARN = "WARN"
+    FAIL = "FAIL"
+    NOT_CHECKABLE = "NOT CHECKABLE"
+    INCOMPLETE = "INCOMPLETE"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One demand held against one limit, in SI."""
+
+    joint: str
+    check: str
+    demand: float | None
+    limit: float | None
+    unit: str
+    margin: float | None
+    """(limit - demand) / demand; the distance to the bound, in `unit`, for positions. None where there is no limit, or
+    nothing is asked."""
+    required_margin: float
+    at_s: float | None
+    verdict: Verdict
+    basis: Basis | None
+    """The weakest of the figures that decide the row; None where nothing decides it."""
+    source: str
+
+
+def check_rows(boom: Boom, trajectory: Trajectory, loads: Loads, payload_as: PayloadAs = "mass") -> tuple[Row, ...]:
+    """Every check of a motion: positions, speeds, accelerations and jerk, then each joint's drive.
+
+    Args:
+        loads: the motion's own, from `inverse_dynamics`.
+        payload_as: how the loads took the payload; the static torques take it alike.
+    """
+    still = np.zeros_like(trajectory.q)
+    static = inverse_dynamics(boom, trajectory.q, still, still, payload_as=payload_as, reactions=False).tau
+    rows: list[Row] = []
+    for i in range(5):
+        rows += _position_rows(boom, trajectory, i)
+        rows += _rate_rows(boom, trajectory, i)
+    for i, drive in enumerate(boom.drives):
+        view = _JointView(JOINTS[i], IS_LENGTH[i], trajectory, loads.tau[:, i], static[:, i], i)
+        rows += _undriven_rows(view) if drive is None else _driven_rows(view, drive)
+    return tuple(rows)
+
+
+def overall(rows: tuple[Row, ...]) -> Verdict:
+    """FAIL where a row fails, INCOMPLETE where one could not be checked, PASS otherwise (a WARN passes)."""
+    verdicts = {row.verdict for row in rows}
+    if Verdict.FAIL in verdicts:
+        return Verdict.FAIL
+    return Verdict.INCOMPLETE if Verdict.NOT_CHECKABLE in verdicts else Verdict.PASS
+
+
+@dataclass(frozen=True, eq=False)
+class _JointView:
+    """One joint of a motion."""
+
+    joint: str
+    is_length: bool
+    trajectory: Trajectory
+    tau: Array
+    static: Array
+    index: int
+
+    @property
+    def qd(self) -> Array:
+        return self.trajectory.qd[:, self.index]
+
+    @property
+    def qdd(self) -> Array:
+        return self.trajectory.qdd[:, self.index]
+
+
+def _held(
+    joint: str,
+    check: str,
+    demand: float,
+    limit: float | None,
+    unit: str,
+    at: float | None,
+    origin: Origin,
+    required: float = 0.0,
+    warn_near: bool = False,
+) -> Row:
+    """A demand against a limit that it may not exceed; without a limit, NOT CHECKABLE."""
+    if limit is None:
+        return Row(joint, check, demand, None, unit, None, required, at, Verdict.NOT_CHECKABLE, None, origin.source)
+    margin = (limit - demand) / demand if demand > 0.0 else None
+    if margin is None or margin >= required + (ESTIMATE_WARNING if warn_near else 0.0):
+        verdict = Verdict.PASS
+    elif margin < required - SAMPLING_SLACK:
+        verdict = Verdict.FAIL
+    else:
+        verdict = Verdict.WARN if warn_near else Verdict.PASS
+    return Row(joint, check, demand, limit, unit, margin, required, at, verdict, origin.basis, origin.source)
+
+
+def _position_rows(boom: Boom, trajectory: Trajectory, i: int) -> Iterator[Row]:
+    limits, unit = boom.limits, "m" if IS_LENGTH[i] else "rad"
+    q = trajectory.q[:, i]
+    excess = np.maximum(limits.lower[i] - q, q - limits.upper[i])
+    at = int(np.argmax(excess))
+    nearest = limits.lower[i] if abs(q[at] - limits.lower[i]) <= abs(q[at] - limits.upper[i]) else limits.upper[i]
+    yield _room(JOINTS[i], "position", q[at], nearest, -excess[at], unit, trajectory.t[at], limits.origins["position"][i])
+    if JOINTS[i] == "lower":
+        gap = trajectory.q[:, 2] - trajectory.q[:, 1]
+        at = int(np.argmin(gap))
+        room = gap[at] - limits.linkage
+        yield _room(
+            "lower",
+            "lower - inner",
+            gap[at],
+            limits.linkage,
+            room,
+            unit,
+            trajectory.t[at],
+            limits.origins["linkage"][0],
+        )
+
+
+def _room(joint: str, check: str, demand: float, limit: float, room: float, unit: str, at: float, origin: Origin) -> Row:
+    verdict = Verdict.PASS if room >= -LIMIT_TOLERANCE else Verdict.FAIL
+    room = 0.0 if abs(room) <= LIMIT_TOLERANCE else float(room)
+    return Row(joint, check, float(demand), float(limit), unit, room, 0.0, float(at), verdict, origin.basis, origin.source)
+
+
+def _rate_rows(boom: Boom, trajectory: Trajectory, i: int) -> Iterator[Row]:
+    base = "m" if IS_LENGTH[i] else "rad"
+    for power, (name, values) in enumerate(
+        (("velocity", trajectory.qd), ("acceleration", trajectory.qdd), ("jerk", trajectory.qddd)), start=1
+    ):
+        if values is None:
+            continue
+        at = int(np.argmax(np.abs(values[:, i])))
+        unit = f"{base}/s" if power == 1 else f"{base}/s^{power}"
+        limit = float(getattr(boom.limits, name)[i])
+        yield _held(
+            JOINTS[i],
+            name,
+            float(abs(values[at, i])),
+            limit,
+            unit,
+            float(trajectory.t[at]),
+            boom.limits.origins[name][i],
+        )
+
+
+def _undriven_rows(view: _JointView) -> Iterator[Row]:
+    """What a joint asks of a drive that is not given."""
+    t, torque, rate = view.trajectory.t, *(("N", "m/s") if view.is_length else ("Nm", "rad/s"))
+    origin = Origin(Basis.PRINTED, "NOT CHECKED: no drive data")
+    force = "force" if view.is_length else "torque"
+    for check, values, unit in (
+        (f"drive peak {force}", view.tau, torque),
+        ("drive top speed", view.qd, rate),
+        ("drive peak power", view.tau * view.qd, "W"),
+        ("drive worst hold", view.static, torque),
+    ):
+        at = int(np.argmax(np.abs(values)))
+        yield _held(view.joint, check, float(abs(values[at])), None, unit, float(t[at]), origin)
+    rms = _time_mean(t, view.tau**2) ** 0.5
+    yield _held(view.joint, f"drive RMS {force}", rms, None, torque, None, origin)
+
+
+def _driven_rows(view: _JointView, drive: Drive) -> Iterator[Row]:
+    yield from _gearbox_rows(view, drive)
+    yield from _motor_rows(view, drive)
+
+
+def _gearbox_rows(view: _JointView, drive: Drive) -> Iterator[Row]:
+    gear, t = drive.gearbox, view.trajectory.t
+    printed = Origin(Basis.PRINTED, f"{gear.source}; {_PROCEDURE}")
+    at = int(np.argmax(np.abs(view.tau)))
+    yield _held(
+        view.joint,
+        "gearbox repeated peak",
+        float(abs(view.tau[at])),
+        gear.start_stop_torque,
+        "Nm",
+        float(t[at]),
+        printed,
+    )
+    average = average_torque(t, view.tau, view.qd)
+    if average is not None:
+        yield _held(view.joint, "gearbox average", average, gear.max_average_torque, "Nm", None, printed)
+    at = int(np.argmax(np.abs(view.static)))
+    derived = Origin(
+        Basis.PRINTED, f"{gear.source}; held for ever at the worst pose, against the average rating [own derivation]"
+    )
+    yield _held(view.joint, "gearbox hold", float(abs(view.static[at])), gear.max_average_torque, "Nm", float(t[at]), derived)
+    at = int(np.argmax(np.abs(view.qd)))
+    speed = float(gear.ratio * abs(view.qd[at]))
+    missing = "" if gear.max_input_speed else "; no input speed is printed"
+    limit = gear.max_input_speed
+    yield _held(
+        view.joint,
+        "gearbox input speed",
+        speed,
+        limit,
+        "rad/s",
+        float(t[at]),
+        Origin(Basis.PRINTED, gear.source + missing),
+    )
+
+
+def _motor_rows(view: _JointView, drive: Drive) -> Iterator[Row]:
+    motor, gear, t = drive.motor, drive.gearbox, view.trajectory.t
+    at = int(np.argmax(np.abs(view.static)))
+    yield _held(
+        view.joint,
+        "motor hold",
+        float(abs(view.static[at]) / gear.ratio),
+        motor.holding_torque,
+        "Nm",
+        float(t[at]),
+        Origin(Basis.PRINTED, f"{motor.source}; no credit for friction [own derivation]"),
+        STEPPER_MARGIN,
+    )
+    demands = []
+    for check, direction in (("motor torque", 1.0), ("motor torque, reversed", -1.0)):
+        torque = motor_torque(drive, view.tau, direction * view.qd, view.qdd)
+        if torque is None:
+            why = f"{motor.source}; {gear.source}; efficiency, no-load torque or an inertia is not printed"
+            yield Row(view.joint, check, None, None, "Nm", None, STEPPER_MARGIN, None, Verdict.NOT_CHECKABLE, None, why)
+            return
+        demands.append(np.abs(torque))
+        yield _motor_torque_row(view, drive, check, demands[-1])
+    yield _motor_speed_row(view, drive, np.maximum(*demands))
+
+
+def _motor_speed_row(view: _JointView, drive: Drive, torque: Array) -> Row:
+    """The sample whose speed comes nearest to the one at which the curve gives its torque with the margin."""
+    speed = drive.gearbox.ratio * np.abs(view.qd)
+    highest = speed_for_torque(drive, (1.0 + STEPPER_MARGIN) * torque)
+    origin = _curve_origin(drive, "speed at which the curve gives the torque of that time with its margin [own derivation]")
+    if highest is None:
+        at = int(np.argmax(speed))
+        limit = None
+    else:
+        room = np.full_like(speed, np.inf)
+        at = int(np.argmin(np.divide(highest, speed, out=room, where=speed > 0.0)))
+        limit = float(highest[at]) if np.isfinite(highest[at]) else None
+    return _held(
+        view.joint, "motor speed", float(speed[at]), limit, "rad/s", float(view.trajectory.t[at]), origin, warn_near=True
+    )
+
+
+def _motor_torque_row(view: _JointView, drive: Drive, check: str, torque: Array) -> Row:
+    """The sample with the least margin against the torque-speed curve, or against the running torque where turning slowly."""
+    motor, t = drive.motor, view.trajectory.t
+    speed = drive.gearbox.ratio * np.abs(view.qd)
+    running = motor.running_torque
+    curve = available_torque(drive, speed)
+    slow = Origin(Basis.PRINTED, f"{motor.source}, running torque")
+    if running is None or (curve is None and (speed > LOW_SPEED).any()):
+        at = int(np.argmax(torque))
+        short = running is not None and torque[at] * (1.0 + STEPPER_MARGIN - SAMPLING_SLACK) > running
+        if short:  # no supply makes a motor stronger than its running torque
+            return _held(view.joint, check, float(torque[at]), running, "Nm", float(t[at]), slow, STEPPER_MARGIN)
+        unknown = Origin(Basis.PRINTED, f"{motor.source}; above low speed only with bus voltage and wiring")
+        return _held(view.joint, check, float(torque[at]), None, "Nm", float(t[at]), unknown, STEPPER_MARGIN)
+    available = np.full_like(torque, running) if curve is None else curve
+    with np.errstate(divide="ignore"):
+        at = int(np.argmin(available / torque))
+    on_curve = curve is not None and speed[at] > LOW_SPEED
+    origin = _curve_origin(drive, "torque-speed curve") if on_curve else slow
+    return _held(
+        view.joint, check, float(torque[at]), float(available[at]), "Nm", float(t[at]), origin, STEPPER_MARGIN, on_curve
+    )
+
+
+def _curve_origin(drive: Drive, what: str) -> Origin:
+    if drive.bus_voltage is None or drive.wiring is None:
+        return Origin(Basis.PRINTED, f"{drive.motor.source}; needs bus voltage and wiring")
+    supply = (
+        f"{drive.bus_voltage.value:g} V ({drive.bus_voltage.origin.basis}), {drive.wiring.value} ({drive.wiring.origin.basis})"
+    )
+    basis = Basis.weakest([Basis.ESTIMATED, *(origin.basis for origin in drive.supply_origins)])
+    return Origin(basis, f"{what}, estimated from {drive.motor.source} at {supply}")
+
+
+def average_torque(t: Array, tau: Array, qd: Array) -> float | None:
+    """Cube mean of the torque weighted by speed, (int |qd| |tau|^3 dt / int |qd| dt)^(1/3) [Nm]; None for a joint that rests.
+
+    Harmonic Drive's average torque. Its weight loses what is only held: see the hold row.
+    """
+    speed = np.abs(qd)
+    travel = float(np.trapezoid(speed, t))
+    if travel <= 0.0:
+        return None
+    return float((np.trapezoid(speed * np.abs(tau) ** 3, t) / travel) ** (1.0 / 3.0))
+
+
+def _time_mean(t: Array, values: Array) -> float:
+    span = float(t[-1] - t[0])
+    return float(np.trapezoid(values, t)) / span if span > 0.0 else float(values.mean())

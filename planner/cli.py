@@ -1,0 +1,335 @@
+"""The command `boom`: parsing and printing, nothing else. What is slow to import is imported by the command that needs it."""
+
+import json
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from boom_model import Boom, BoomError, InfeasibleError, inverse_kinematics
+from planner.targets import HOLDS, parse_hold, parse_pitch, parse_target, unreachable
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from planner.report import Report
+
+ANSWER_IS_NO, BAD_INPUT = 1, 2
+_PIPE_WIDTH = 132
+
+boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; else the third generation.")
+payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; else the boom's own.")
+payload_as_option = click.option(
+    "--payload-as", type=click.Choice(["mass", "force"]), default="mass", show_default=True,
+    help="Accelerate the payload with the tip, or hang its weight there and leave out its inertia, as the thesis does.",
+)  # fmt: skip
+json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
+pitch_option = click.option(
+    "--pitch",
+    default="down",
+    show_default=True,
+    metavar="down|level|up|DEG",
+    help="Elevation of the end effector at a tip target.",
+)
+hold_option = click.option(
+    "--hold",
+    default="horizontal",
+    show_default=True,
+    metavar="HOLD",
+    help=f"Extra constraint of a tip target: {HOLDS}.",
+)
+
+
+def main() -> None:
+    """Run the command; exit 0 done, 1 the answer is no, 2 bad input with one line on standard error."""
+    try:
+        code = cli.main(prog_name="boom", standalone_mode=False)
+    except click.ClickException as error:
+        _complain(error.format_message())
+        code = BAD_INPUT
+    except click.Abort:
+        code = 130
+    except InfeasibleError as error:
+        _complain(str(error))
+        code = ANSWER_IS_NO
+    except BoomError as error:
+        _complain(str(error))
+        code = BAD_INPUT
+    sys.exit(code)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
+@click.version_option(package_name="boom", prog_name="boom")
+def cli() -> None:
+    """Plan, check and watch the moves of the third-generation phenotyping boom.
+
+    Angles are in degrees and lengths in metres; files and JSON are in SI.
+    """
+
+
+@cli.command(context_settings={"ignore_unknown_options": True})  # so that -0.5 is a number
+@click.argument("start")
+@click.argument("goal")
+@click.option(
+    "--profile", type=click.Choice(["cubic", "time-optimal", "jerk-limited"]), default="cubic", show_default=True,
+    help="How the path is timed.",
+)  # fmt: skip
+@click.option("--duration", type=float, metavar="S", help="Else the least that the limits allow.")
+@pitch_option
+@hold_option
+@payload_option
+@click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
+@click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
+@boom_option
+@json_option
+def plan(
+    start: str,
+    goal: str,
+    profile: str,
+    duration: float | None,
+    pitch: str,
+    hold: str,
+    payload: float | None,
+    out: str,
+    csv_file: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Plan a move, check it against limits and drives, and record it.
+
+    START and GOAL are a named pose (transport, phenotyping), a joint position q=YAW,INNER,LOWER,EXTENSION,WRIST, or a tip
+    target tip=X,Y,Z.
+
+    \b
+    Examples:
+      boom plan transport phenotyping
+      boom plan transport tip=1.4,0,1.0 --hold extension=0.25 --profile time-optimal
+    """
+    from planner.planning import plan as plan_move
+    from planner.trajectory import write_csv
+
+    boom = _load(boom_file, payload)
+    try:
+        move = plan_move(
+            boom,
+            parse_target(start),
+            parse_target(goal),
+            profile=profile,
+            duration=duration,
+            pitch=parse_pitch(pitch),
+            hold=parse_hold(hold),
+        )
+    except InfeasibleError as error:
+        if as_json:
+            _print_json(
+                {
+                    "profile": profile,
+                    "duration_s": None,
+                    "verdict": "FAIL",
+                    "checks": [],
+                    "files": {},
+                    "reason": str(error),
+                }
+            )
+        raise
+    from planner.recording import write_recording
+
+    written = {"recording": out}
+    write_recording(out, boom, move.trajectory, move.loads, move.report)
+    if csv_file is not None:
+        write_csv(move.trajectory, csv_file, move.loads.tau)
+        written["csv"] = csv_file
+    return _print_report(move.report, written, as_json)
+
+
+@cli.command(context_settings={"ignore_unknown_options": True})
+@click.argument("x", type=float)
+@click.argument("y", type=float)
+@click.argument("z", type=float)
+@pitch_option
+@hold_option
+@boom_option
+@json_option
+def ik(x: float, y: float, z: float, pitch: str, hold: str, boom_file: str | None, as_json: bool) -> int:
+    """Every joint position that puts the tip at X Y Z (m, in the base frame).
+
+    \b
+    Example:
+      boom ik 1.4 0 1.0 --pitch down --hold extension=0.25
+    """
+    boom = _load(boom_file)
+    angle, held, position = parse_pitch(pitch), parse_hold(hold), (x, y, z)
+    found = inverse_kinematics(boom, position, angle, held)
+    reason = None if found.best is not None else unreachable(boom, position, angle, held)
+    if as_json:
+        answer: dict[str, Any] = {
+            "target": {"position_m": position, "pitch_rad": angle, "hold": str(held)},
+            "solutions": [
+                {"q": s.q.tolist(), "within_limits": s.within_limits, "reasons": list(s.reasons)} for s in found.solutions
+            ],
+            "best": found.best,
+        }
+        _print_json(answer if reason is None else answer | {"reason": reason})
+    elif found.solutions:
+        table = _table("branch", "yaw deg", "inner deg", "lower deg", "extension m", "wrist deg", "within limits", "reasons")
+        for i, s in enumerate(found.solutions):
+            q = np.where([0, 0, 0, 1, 0], s.q, np.degrees(s.q))
+            best = " (best)" if i == found.best else ""
+            table.add_row(
+                f"{i + 1}{best}",
+                *(f"{v:.4f}" for v in q),
+                "yes" if s.within_limits else "no",
+                "\n".join(s.reasons) or "-",
+            )
+        _console().print(table)
+    if reason is not None:
+        raise InfeasibleError(reason)
+    return 0
+
+
+@cli.command()
+@click.argument("motion", metavar="IN.csv")
+@click.option("--out", required=True, metavar="OUT.csv", help="The motion with tau1..tau5 appended.")
+@payload_option
+@payload_as_option
+@boom_option
+@json_option
+def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
+    """Inverse dynamics of a motion: the torque of each joint at each sample.
+
+    IN.csv holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
+
+    \b
+    Example:
+      boom torque move.csv --out torques.csv --payload 8
+    """
+    from boom_model import JOINTS, inverse_dynamics
+    from planner.trajectory import read_csv, write_csv
+
+    boom, trajectory = _load(boom_file, payload), read_csv(motion)
+    tau = inverse_dynamics(boom, trajectory.q, trajectory.qd, trajectory.qdd, payload_as=payload_as, reactions=False).tau
+    write_csv(trajectory, out, tau)
+    at = np.abs(tau).argmax(axis=0)
+    peaks = [
+        {"joint": joint, "tau": float(tau[k, i]), "unit": "N" if i == 3 else "Nm", "at_s": float(trajectory.t[k])}
+        for i, (joint, k) in enumerate(zip(JOINTS, at, strict=True))
+    ]
+    if as_json:
+        _print_json({"peaks": peaks, "notes": list(trajectory.notes), "files": {"csv": out}})
+        return 0
+    table = _table("joint", "peak", "at")
+    for peak in peaks:
+        table.add_row(str(peak["joint"]), f"{peak['tau']:.3f} {peak['unit']}", f"{peak['at_s']:.3f} s")
+    _console().print(table)
+    _print_lines("Note", trajectory.notes)
+    click.echo(f"csv: {out}")
+    return 0
+
+
+@cli.command()
+@click.argument("motion", metavar="IN.csv")
+@payload_option
+@payload_as_option
+@boom_option
+@json_option
+def check(motion: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
+    """Hold any motion against the joint limits and the drives' datasheets.
+
+    \b
+    Example:
+      boom plan transport phenotyping --csv move.csv
+      boom check move.csv --payload 8
+    """
+    from planner.planning import check as check_motion
+    from planner.trajectory import read_csv
+
+    boom, trajectory = _load(boom_file, payload), read_csv(motion)
+    return _print_report(check_motion(boom, trajectory, payload_as=payload_as), {}, as_json)
+
+
+@cli.command()
+@json_option
+def validate(as_json: bool) -> int:
+    """The thesis's tables 2-5 to 2-8, row by row, against this model."""
+    from planner.validation import validate as validate_model
+
+    rows = validate_model(Boom.load())
+    failed = sum(not row.ok for row in rows)
+    if as_json:
+        listed = [{**vars(row), "ok": row.ok} for row in rows]
+        _print_json({"ok": failed == 0, "rows": listed})
+    else:
+        table = _table("table", "row", "quantity", "expected", "actual", "tolerance", "ok", "note")
+        for row in rows:
+            numbers = (f"{row.expected:.6g}", f"{row.actual:.5f}", f"{row.tolerance:.1g}")
+            table.add_row(row.table, row.row, row.quantity, *numbers, "OK" if row.ok else "FAIL", row.note)
+        _console().print(table)
+        click.echo(f"{len(rows) - failed} of {len(rows)} rows hold")
+    return ANSWER_IS_NO if failed else 0
+
+
+@cli.command()
+@click.argument("recording", metavar="FILE.rrd", type=click.Path(exists=True, dir_okay=False))
+def view(recording: str) -> int:
+    """Open a recording in the Rerun viewer."""
+    return subprocess.run([sys.executable, "-m", "rerun", recording], check=False).returncode
+
+
+def _load(boom_file: str | None, payload: float | None = None) -> Boom:
+    boom = Boom.load(boom_file)
+    return boom if payload is None else boom.with_payload(payload)
+
+
+def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:
+    from planner.checks import Verdict
+    from planner.report import cells
+
+    if as_json:
+        _print_json(report.to_json(written))
+    else:
+        table = _table("joint", "check", "demand", "limit", "margin", "required", "at", "verdict", "basis")
+        for i, row in enumerate(report.rows):
+            last = i + 1 == len(report.rows) or report.rows[i + 1].joint != row.joint
+            table.add_row(*cells(row), style=_STYLES.get(row.verdict), end_section=last)
+        console = _console()
+        console.print(table)
+        _print_lines("Note", report.notes)
+        _print_lines("Assumed", report.assumptions)
+        console.print(f"{report.profile}, {report.duration:.3f} s", highlight=False)
+        console.print(report.summary, style=_STYLES.get(report.verdict), highlight=False, soft_wrap=True)
+        for kind, name in written.items():
+            click.echo(f"{kind}: {name}")
+    return ANSWER_IS_NO if report.verdict is Verdict.FAIL else 0
+
+
+_STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta"}
+
+
+def _print_lines(title: str, lines: tuple[str, ...]) -> None:
+    for line in lines:
+        click.echo(f"{title}: {line}")
+
+
+def _print_json(answer: dict[str, Any]) -> None:
+    click.echo(json.dumps(answer, allow_nan=False, indent=2))
+
+
+def _complain(message: str) -> None:
+    click.echo(f"boom: {' '.join(message.split())}", err=True)
+
+
+def _console() -> "Console":
+    from rich.console import Console
+
+    console = Console()
+    return console if console.is_terminal else Console(width=_PIPE_WIDTH)
+
+
+def _table(*columns: str) -> "Table":
+    from rich.box import SIMPLE
+    from rich.table import Table
+
+    return Table(*columns, box=SIMPLE, pad_edge=False)

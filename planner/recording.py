@@ -1,0 +1,304 @@
+"""A move as one Rerun file: the moving linkage, every joint's plots beside its limits, the report, and how to show them.
+
+    /world                    z up; frames hang from "tf#/world", which is frame 1 of the boom [m]
+    /world/mount, /tip_path   static: the plate that the boom stands on, and the tip's whole path
+    /world/boom/<body>        its pose (frame "<body>" in "tf#/world") over time, and its solid; likewise /world/boom/tip
+    /plots/<quantity>/<joint> q, qd, qdd, tau over time, in deg and m, Nm and N; /plots/q/linkage is theta3 - theta2
+    .../limits                the limits beside it; those that do not change with the motion at the move's two ends only
+    /report                   the report as Markdown
+
+The timeline is "t". The linkage comes solved: each body's frame is a child of the world, because a frame has one parent and
+a closed loop cannot be shown. The solids' lengths are the model's, their thickness is for the eye only.
+"""
+
+import uuid
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from scipy.spatial.transform import Rotation
+
+from boom_model import JOINTS, Basis, Boom, Loads, body_transforms
+from boom_model.arrays import Array
+from boom_model.boom import IS_LENGTH
+from boom_model.drives import drive_inertia, drive_torque_limit
+from boom_model.frames import R_LINK_BODY, frame_transforms
+from planner.files import replacing
+from planner.report import Report
+from planner.trajectory import Trajectory
+
+Color = tuple[int, int, int]
+
+# Okabe and Ito's palette, which the colour-blind can tell apart. A joint's line has the colour of the body that it moves.
+COLORS: dict[str, Color] = {
+    "base": (153, 153, 153),
+    "lower": (240, 228, 66),
+    "inner": (86, 180, 233),
+    "outer": (0, 158, 115),
+    "upper": (230, 159, 0),
+    "extension": (0, 114, 178),
+    "end_effector": (204, 121, 167),
+}
+JOINT_COLORS = dict(zip(JOINTS, (COLORS[b] for b in ("base", "inner", "lower", "extension", "end_effector")), strict=True))
+LIMIT_COLOR: Color = (213, 94, 0)
+PIN_COLOR: Color = (60, 60, 60)
+PAYLOAD_COLOR: Color = (230, 230, 230)
+
+_STEEL = 7850.0  # [kg/m^3]: the payload is shown as a ball of steel
+
+
+def write_recording(path: str | Path, boom: Boom, trajectory: Trajectory, loads: Loads, report: Report) -> None:
+    """Writes a move's recording with its blueprint; `boom view` or `rerun` shows it.
+
+    Args:
+        path: the .rrd file.
+        loads: the trajectory's own, tau (n, 5).
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    with replacing(path) as temporary:
+        Path(temporary).write_bytes(_encoded(boom, trajectory, loads, report))
+
+
+def _encoded(boom: Boom, trajectory: Trajectory, loads: Loads, report: Report) -> bytes:
+    """The whole .rrd.
+
+    It is put together in memory: Rerun's own file sink waits for ever on a full disk. Each recording has an id of its own,
+    as the viewer would merge two that share one.
+    """
+    poses = body_transforms(boom, trajectory.q)
+    plots = _plots(boom, trajectory, loads)
+    strict = rr.strict_mode()
+    rr.set_strict_mode(True)  # a misuse of Rerun raises, and is not a line in a log
+    try:
+        with rr.RecordingStream("boom", recording_id=uuid.uuid4()) as recording:
+            memory = recording.memory_recording()
+            recording.send_blueprint(_blueprint(_eye(boom, trajectory.q), plots))
+            recording.send_recording_name(f"{boom.name}: {report.profile}, {report.duration:.3f} s")
+            recording.log("report", rr.TextDocument(report.to_markdown(), media_type="text/markdown"), static=True)
+            _log_solids(recording, boom)
+            _log_motion(recording, trajectory.t, poses)
+            for plot in (plot for tab in plots.values() for plot in tab):
+                _log_plot(recording, trajectory.t, plot)
+        return memory.drain_as_bytes()
+    finally:
+        rr.set_strict_mode(strict)
+
+
+def _time(t: Array) -> rr.TimeColumn:
+    return rr.TimeColumn("t", duration=np.rint(t * 1e9).astype("timedelta64[ns]"))
+
+
+# The linkage
+
+
+def _log_motion(recording: rr.RecordingStream, t: Array, poses: Mapping[str, Array]) -> None:
+    for name, T in poses.items():
+        motion = rr.Transform3D.columns(
+            translation=T[:, :3, 3],
+            quaternion=Rotation.from_matrix(T[:, :3, :3]).as_quat(),
+            parent_frame=["tf#/world"] * len(t),
+            child_frame=[name] * len(t),
+        )
+        recording.send_columns(f"world/boom/{name}", [_time(t)], motion)
+    path = rr.LineStrips3D([poses["tip"][:, :3, 3]], colors=[PAYLOAD_COLOR], radii=[0.004])
+    recording.log("world/tip_path", path, static=True)
+
+
+def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
+    def log(name: str, shape: rr.Boxes3D | rr.Cylinders3D | rr.Points3D, frame: str | None = None) -> None:
+        recording.log(name, shape, *([] if frame is None else [rr.CoordinateFrame(frame)]), static=True)
+
+    recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    log("world/mount", _boxes(np.array([[-0.2, -0.2, -0.02]]), np.array([[0.2, 0.2, 0.0]]), PIN_COLOR))
+    for name, bars in _bars(boom).items():
+        R = R_LINK_BODY[name]
+        low, high = (np.array([corner(bar) for bar in bars]) @ R for corner in (_Bar.low, _Bar.high))
+        log(f"world/boom/{name}", _boxes(low, high, COLORS[name]), name)
+    for name, along in _pins(boom).items():
+        centers = np.array([(e, 0.0, 0.0) for e in along]) @ R_LINK_BODY[name]
+        # A cylinder lies along z, and these bodies' z is the pins' direction n.
+        pins = rr.Cylinders3D(centers=centers, lengths=0.16, radii=0.018, colors=PIN_COLOR, fill_mode="solid")
+        log(f"world/boom/{name}/pins", pins, name)
+    if boom.payload > 0.0:
+        radius = (boom.payload / _STEEL * 0.75 / np.pi) ** (1.0 / 3.0)
+        log("world/boom/tip", rr.Points3D([(0.0, 0.0, 0.0)], radii=radius, colors=PAYLOAD_COLOR), "tip")
+
+
+def _boxes(low: Array, high: Array, color: Color) -> rr.Boxes3D:
+    """Solid boxes between opposite corners, (boxes, 3) each."""
+    return rr.Boxes3D(centers=(low + high) / 2.0, half_sizes=np.abs(high - low) / 2.0, colors=color, fill_mode="solid")
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """A box in a link's axes (e, p, n): from e[0] to e[1] along the link, p[0] to p[1] across it, depth along the pins [m]."""
+
+    e: tuple[float, float]
+    p: tuple[float, float]
+    depth: float
+
+    def low(self) -> tuple[float, float, float]:
+        return self.e[0], self.p[0], -self.depth / 2.0
+
+    def high(self) -> tuple[float, float, float]:
+        return self.e[1], self.p[1], self.depth / 2.0
+
+
+def _bars(boom: Boom) -> dict[str, list[_Bar]]:
+    """The solids of every body. The extension is a rod: `grip` of it shows when retracted, and stays inside at full stroke."""
+    g, grip = boom.geometry, 0.05
+    rod = max(float(boom.limits.upper[3]) + 2.0 * grip, g.L7)
+    return {
+        "base": [_Bar((-0.09, 0.09), (0.0, g.L1 - 0.025), 0.18)],
+        "lower": [_Bar((0.0, g.L3), (-0.025, 0.025), 0.10)],
+        "inner": [_Bar((0.0, g.L9), (-0.025, 0.025), 0.06)],
+        "outer": [_Bar((0.0, g.L4), (-0.02, 0.02), 0.05)],
+        "upper": [
+            _Bar((0.0, g.L5), (-0.025, 0.025), 0.10),
+            _Bar((-g.L7 + grip, rod - g.L7), (-g.L6 - 0.03, -g.L6 + 0.03), 0.08),
+        ],
+        "extension": [_Bar((0.0, rod), (-0.018, 0.018), 0.04)],
+        "end_effector": [_Bar((-0.025, 0.025), (-0.025, g.L8), 0.14)],
+    }
+
+
+def _pins(boom: Boom) -> dict[str, tuple[float, ...]]:
+    """How far along its link each pin sits [m]: shoulder and 6, 8 and 7, wrist."""
+    return {"lower": (0.0, boom.geometry.L3), "upper": (0.0, boom.geometry.L5), "end_effector": (0.0,)}
+
+
+# The plots
+
+
+@dataclass(frozen=True, eq=False)
+class _Plot:
+    """One quantity of one joint in people's units, with the limits beside it."""
+
+    entity: str
+    name: str
+    unit: str
+    color: Color
+    values: Array
+    limits: Mapping[str, float | Array]
+    """Name to value, or values (n,) where it changes with the motion; empty where no limit is known."""
+    basis: Basis
+    """Of the limits."""
+
+    @property
+    def title(self) -> str:
+        return f"{self.name} [{self.unit}]"
+
+    @property
+    def limit_titles(self) -> list[str]:
+        mark = " (assumed)" if self.basis is Basis.ASSUMED else ""
+        return [f"{name} [{self.unit}]{mark}" for name in self.limits]
+
+
+def _plots(boom: Boom, trajectory: Trajectory, loads: Loads) -> dict[str, list[_Plot]]:
+    """The plots of each tab."""
+    limits = boom.limits
+    positions = _joint_plots(boom, "q", "position", "", trajectory.q, limits.lower, limits.upper)
+    velocities = _joint_plots(boom, "qd", "velocity", "/s", trajectory.qd, -limits.velocity, limits.velocity)
+    accelerations = _joint_plots(boom, "qdd", "acceleration", "/s^2", trajectory.qdd, -limits.acceleration, limits.acceleration)
+    linkage = _Plot(
+        "plots/q/linkage",
+        "lower - inner",
+        "deg",
+        COLORS["upper"],
+        np.degrees(trajectory.q[:, 2] - trajectory.q[:, 1]),
+        {"lower limit": float(np.degrees(limits.linkage))},
+        limits.origins["linkage"][0].basis,
+    )
+    return {
+        "Positions": [*positions, linkage],
+        "Velocities": list(velocities),
+        "Accelerations": list(accelerations),
+        "Torques": list(_torque_plots(boom, trajectory, loads.tau)),
+    }
+
+
+def _joint_plots(boom: Boom, quantity: str, name: str, per: str, values: Array, lower: Array, upper: Array) -> Iterator[_Plot]:
+    """One of q, qd and qdd: values (n, 5) between lower and upper (5,), in SI."""
+    for i, joint in enumerate(JOINTS):
+        low, high = _for_people(i, np.array([lower[i], upper[i]]))
+        yield _Plot(
+            f"plots/{quantity}/{joint}",
+            f"{joint} {name}",
+            f"{'m' if IS_LENGTH[i] else 'deg'}{per}",
+            JOINT_COLORS[joint],
+            _for_people(i, values[:, i]),
+            {"lower limit": float(low), "upper limit": float(high)},
+            boom.limits.origins[name][i].basis,
+        )
+
+
+def _for_people(joint: int, values: Array) -> Array:
+    return values if IS_LENGTH[joint] else np.degrees(values)
+
+
+def _torque_plots(boom: Boom, trajectory: Trajectory, tau: Array) -> Iterator[_Plot]:
+    """Joint torques beside what the drive leaves for them, sample by sample.
+
+    That is -T - J qdd to T - J qdd, with T(qd) what the drive allows at the joint's speed and J its own inertia, which it
+    drives too: a curve between its limits is a drive that keeps `drive_torque_limit`.
+    """
+    for i, (joint, drive) in enumerate(zip(JOINTS, boom.drives, strict=True)):
+        limit = None if drive is None else drive_torque_limit(drive, trajectory.qd[:, i])
+        limits: dict[str, float | Array] = {}
+        if drive is not None and limit is not None:
+            own = drive_inertia(drive) * trajectory.qdd[:, i]
+            limits = {"drive's lower limit": -limit - own, "drive's upper limit": limit - own}
+        basis = Basis.weakest([] if drive is None else [origin.basis for origin in drive.supply_origins])
+        name, unit = ("force", "N") if IS_LENGTH[i] else ("torque", "Nm")
+        yield _Plot(f"plots/tau/{joint}", f"{joint} {name}", unit, JOINT_COLORS[joint], tau[:, i], limits, basis)
+
+
+def _log_plot(recording: rr.RecordingStream, t: Array, plot: _Plot) -> None:
+    style = rr.SeriesLines if len(t) > 1 else rr.SeriesPoints  # a line through one sample is not seen
+    recording.log(plot.entity, style(names=[plot.title], colors=[plot.color]), static=True)
+    recording.send_columns(plot.entity, [_time(t)], rr.Scalars.columns(scalars=plot.values))
+    if plot.limits:
+        entity, times = f"{plot.entity}/limits", t
+        values = np.stack(list(plot.limits.values()), axis=-1)
+        if values.ndim == 1:  # what does not change is known by the move's two ends
+            times = np.unique(t[[0, -1]])
+            values = np.tile(values, (len(times), 1))
+        recording.log(entity, style(names=plot.limit_titles, colors=[LIMIT_COLOR] * len(plot.limits)), static=True)
+        recording.send_columns(entity, [_time(times)], rr.Scalars.columns(scalars=values))
+
+
+# How it is shown
+
+
+def _blueprint(eye: rrb.EyeControls3D, plots: Mapping[str, Sequence[_Plot]]) -> rrb.Blueprint:
+    tabs = [rrb.Grid(*(_plot_view(plot) for plot in tab), grid_columns=2, name=name) for name, tab in plots.items()]
+    report = rrb.TextDocumentView(origin="/report", name="Report")
+    boom = rrb.Spatial3DView(origin="/world", name="Boom [m]", eye_controls=eye)
+    return rrb.Blueprint(
+        rrb.Horizontal(boom, rrb.Tabs(*tabs, report, active_tab=0), column_shares=[1, 1]),
+        rrb.TimePanel(timeline="t", state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+    )
+
+
+def _plot_view(plot: _Plot) -> rrb.TimeSeriesView:
+    first, second = plot.values[: len(plot.values) // 2 + 1], plot.values[len(plot.values) // 2 :]
+    corner = rrb.Corner2D.LeftBottom if first.min() > second.min() else rrb.Corner2D.RightBottom  # clear of the curve
+    return rrb.TimeSeriesView(origin=f"/{plot.entity}", name=plot.title, plot_legend=corner)
+
+
+def _eye(boom: Boom, q: Array) -> rrb.EyeControls3D:
+    """From the boom's right at the middle of its move, a little from above, and far enough off to see all of it."""
+    points = frame_transforms(boom, q, "outer")[..., :3, 3].reshape(-1, 3)
+    center = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    yaw = q[len(q) // 2, 0]
+    direction = np.array([np.sin(yaw), -np.cos(yaw), 0.5])
+    distance = 0.5 + 1.1 * float(np.linalg.norm(np.ptp(points, axis=0)))
+    eye = center + distance * direction / np.linalg.norm(direction)
+    return rrb.EyeControls3D(position=eye, look_target=center, eye_up=(0.0, 0.0, 1.0))

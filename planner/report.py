@@ -1,0 +1,121 @@
+"""A motion's report: its rows, what was assumed, and the verdict."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from boom_model import JOINTS, Basis, Boom
+from boom_model.arrays import Array
+from boom_model.boom import IS_LENGTH
+from planner.checks import Row, Verdict, overall
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What was checked, and what came of it."""
+
+    profile: str
+    duration: float
+    """[s]"""
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...]
+    """What a reader must know of the motion or its data."""
+    assumptions: tuple[str, ...]
+    """Every assumed figure of the boom that the checks or the planner use."""
+
+    @property
+    def verdict(self) -> Verdict:
+        return overall(self.rows)
+
+    @property
+    def summary(self) -> str:
+        """The verdict in a sentence, with what decides it."""
+        failed = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.FAIL]
+        unknown = sorted({r.joint for r in self.rows if r.verdict is Verdict.NOT_CHECKABLE}, key=JOINTS.index)
+        warned = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.WARN]
+        parts = [f"failed: {', '.join(failed)}"] if failed else []
+        parts += [f"close to an estimated or assumed limit: {', '.join(warned)}"] if warned else []
+        parts += [f"not checkable for want of data: {', '.join(unknown)}"] if unknown else []
+        return f"{self.verdict}: {'; '.join(parts) if parts else 'every check passed'}"
+
+    def to_json(self, files: dict[str, str]) -> dict[str, Any]:
+        """The JSON object of `boom plan` and `boom check`, in SI."""
+        return {
+            "profile": self.profile,
+            "duration_s": self.duration,
+            "verdict": self.verdict,
+            "checks": [asdict(row) for row in self.rows],
+            "notes": list(self.notes),
+            "assumptions": list(self.assumptions),
+            "files": files,
+        }
+
+    def to_markdown(self) -> str:
+        """The report as Markdown, in people's units."""
+        header = ("joint", "check", "demand", "limit", "margin", "required", "at", "verdict", "basis", "source")
+        lines = [
+            f"# {self.summary}",
+            "",
+            f"{self.profile}, {self.duration:.3f} s",
+            "",
+            "| " + " | ".join(header) + " |",
+            "|" + " --- |" * len(header),
+        ]
+        lines += ["| " + " | ".join((*cells(row), row.source)) + " |" for row in self.rows]
+        for title, texts in (("Notes", self.notes), ("Assumed", self.assumptions)):
+            if texts:
+                lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
+        return "\n".join(lines) + "\n"
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """A row for people: joint, check, demand, limit, margin, required margin, time, verdict, basis."""
+    factor, unit = _for_people(row)
+    if row.margin is None:
+        margin = "-"
+    elif row.check in ("position", "lower - inner"):
+        margin = f"{row.margin * factor:.4g} {unit}"
+    else:
+        margin = f"{row.margin:.0%}"
+    return (
+        row.joint,
+        row.check,
+        "-" if row.demand is None else f"{row.demand * factor:.4g} {unit}",
+        "-" if row.limit is None else f"{row.limit * factor:.4g} {unit}",
+        margin,
+        f"{row.required_margin:.0%}",
+        "-" if row.at_s is None else f"{row.at_s:.2f} s",
+        row.verdict,
+        row.basis or "-",
+    )
+
+
+def _for_people(row: Row) -> tuple[float, str]:
+    if row.unit == "rad/s" and row.check.startswith(("motor", "gearbox")):
+        return 60.0 / (2.0 * np.pi), "rpm"
+    if row.unit.startswith("rad"):
+        return 180.0 / np.pi, row.unit.replace("rad", "deg")
+    return 1.0, row.unit
+
+
+def assumptions(boom: Boom, jerk_limited: bool) -> tuple[str, ...]:
+    """Every assumed figure of a boom, a sentence each; the jerk limits only where a motion was planned with them."""
+    limits = boom.limits
+    sentences = []
+    for power, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
+        if name == "jerk" and not jerk_limited:
+            continue
+        values: Array = getattr(limits, name)
+        for i, origin in enumerate(limits.origins[name]):
+            if origin.basis is Basis.ASSUMED:
+                per = "/s" if power == 1 else f"/s^{power}"
+                value = f"{values[i]:g} m{per}" if IS_LENGTH[i] else f"{np.degrees(values[i]):g} deg{per}"
+                sentences.append(f"{JOINTS[i]} {name} limit {value}: {origin.source}")
+    for joint, drive in zip(JOINTS, boom.drives, strict=True):
+        voltage, wiring = (None, None) if drive is None else (drive.bus_voltage, drive.wiring)
+        if voltage is not None and voltage.origin.basis is Basis.ASSUMED:
+            sentences.append(f"{joint} bus voltage {voltage.value:g} V: {voltage.origin.source}")
+        if wiring is not None and wiring.origin.basis is Basis.ASSUMED:
+            sentences.append(f"{joint} wiring {wiring.value}: {wiring.origin.source}")
+    return tuple(sentences)

@@ -1,0 +1,160 @@
+"""A sampled motion, and its CSV form."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, checked, read_only
+from boom_model.errors import InputError
+from planner.files import replacing
+from planner.time_law import Motion
+
+STEP = 0.01
+"""Default sampling step [s], the thesis's (section 3.5)."""
+
+_QUANTITIES = ("q", "qd", "qdd")
+COLUMNS = ("t", *(f"{name}{i}" for name in _QUANTITIES for i in range(1, 6)))
+"""Header of a motion's CSV, in SI."""
+
+TORQUES = tuple(f"tau{i}" for i in range(1, 6))
+"""Columns that follow where torques are written, in Nm and N."""
+
+_FITTED = "velocities and accelerations are not in the file: taken from a cubic spline through its positions"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Joint motion sampled at times t (n,): q, qd, qdd (n, 5), read-only, in rad, m and s."""
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    qddd: Array | None = None
+    """Jerk, of a motion that was planned with a limit on it."""
+    notes: tuple[str, ...] = ()
+    """What a reader of a report must know about where the samples come from."""
+
+    @staticmethod
+    def from_samples(
+        t: ArrayLike,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        qddd: ArrayLike | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> "Trajectory":
+        """A trajectory from arrays, checked.
+
+        Raises:
+            InputError: not finite, shapes that do not match, no sample, or times that do not increase.
+        """
+        t = checked("t", t)
+        if t.ndim != 1 or t.size == 0:
+            raise InputError(f"t has shape {t.shape}; it must be (n,) with at least one sample")
+        if (np.diff(t) <= 0).any():
+            at = int(np.argmax(np.diff(t) <= 0)) + 1
+            raise InputError(f"t[{at}] = {t[at]:g} s does not come after t[{at - 1}] = {t[at - 1]:g} s; times must increase")
+        arrays = {"q": q, "qd": qd, "qdd": qdd} | ({} if qddd is None else {"qddd": qddd})
+        ready = {name: read_only(checked(name, values, 5)) for name, values in arrays.items()}
+        for name, array in ready.items():
+            if array.shape != (t.size, 5):
+                raise InputError(f"{name} has shape {array.shape}; with {t.size} times it must be ({t.size}, 5)")
+        return Trajectory(t=read_only(t), notes=notes, **ready)
+
+    @property
+    def duration(self) -> float:
+        return float(self.t[-1] - self.t[0])
+
+
+def sample(motion: Motion, step: float = STEP) -> Trajectory:
+    """The motion at equal steps of at most `step` seconds, its two ends included.
+
+    Raises:
+        InputError: step is not a positive number.
+    """
+    if not float(checked("step", step)) > 0.0:
+        raise InputError(f"step is {step} s; it must be above 0 s")
+    t = np.linspace(0.0, motion.duration, int(np.ceil(motion.duration / step)) + 1)
+    q, qd, qdd, qddd = motion(t)
+    return Trajectory.from_samples(t, q, qd, qdd, qddd if motion.law.jerk_limited else None)
+
+
+def at_rest(q: Array) -> Trajectory:
+    """The empty move: one sample, standing still at q (5,)."""
+    zero = np.zeros((1, 5))
+    return Trajectory.from_samples([0.0], q[None], zero, zero)
+
+
+def write_csv(trajectory: Trajectory, path: str | Path, tau: Array | None = None) -> None:
+    """The motion as CSV, all digits, with tau1..tau5 appended where given.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    import pyarrow as pa
+    from pyarrow import csv
+
+    columns = [trajectory.t, *trajectory.q.T, *trajectory.qd.T, *trajectory.qdd.T]
+    names = list(COLUMNS)
+    if tau is not None:
+        columns += [*tau.T]
+        names += TORQUES
+    table = pa.table([np.ascontiguousarray(c) for c in columns], names=names)
+    with replacing(path) as temporary:
+        csv.write_csv(table, temporary, csv.WriteOptions(quoting_style="none", quoting_header="none"))
+
+
+def read_csv(path: str | Path) -> Trajectory:
+    """A motion from CSV: t, q1..q5, and qd1..qd5, qdd1..qdd5 or neither (then a cubic spline through q gives them).
+
+    Derivatives that are given are used as given. tau1..tau5 are passed over.
+
+    Raises:
+        InputError: the file cannot be read, is not CSV, lacks a column or has one that is not known, or holds no samples,
+            values that are not finite numbers, or times that do not increase.
+    """
+    import pyarrow as pa
+    from pyarrow import csv
+
+    numbers = dict.fromkeys((*COLUMNS, *TORQUES), pa.float64())
+    try:
+        table = csv.read_csv(str(path), convert_options=csv.ConvertOptions(column_types=numbers))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except pa.ArrowInvalid as error:
+        raise InputError(f"{path}: not a motion's CSV: {error}") from None
+    names = set(table.column_names)
+    needed = set(COLUMNS if names & set(COLUMNS[6:]) else COLUMNS[:6])
+    _complain(path, "lacks the column", needed - names)
+    _complain(path, "has an unknown column", names - numbers.keys())
+    data = {name: table[name].to_numpy() for name in needed}
+    for name, values in data.items():
+        if not np.isfinite(values).all():
+            row = int(np.argmin(np.isfinite(values)))
+            raise InputError(f"{path}: line {row + 2}, column {name}: {values[row]} is not a finite number")
+    stacked = {name: np.stack([data[f"{name}{i}"] for i in range(1, 6)], axis=-1) for name in _QUANTITIES if f"{name}1" in data}
+    try:
+        if "qd" in stacked:
+            return Trajectory.from_samples(data["t"], stacked["q"], stacked["qd"], stacked["qdd"])
+        return _fitted(data["t"], stacked["q"])
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _fitted(t: Array, q: Array) -> Trajectory:
+    from scipy.interpolate import CubicSpline
+
+    still = np.zeros_like(q)
+    plain = Trajectory.from_samples(t, q, still, still)
+    if t.size < 4:
+        raise InputError(f"{t.size} samples without velocities and accelerations; a spline needs at least 4")
+    spline = CubicSpline(plain.t, plain.q)
+    return Trajectory.from_samples(t, q, spline(t, 1), spline(t, 2), notes=(_FITTED,))
+
+
+def _complain(path: str | Path, what: str, names: set[str]) -> None:
+    if names:
+        raise InputError(f"{path}: {what} {', '.join(sorted(names))}; a motion has {','.join(COLUMNS)} or its first six")

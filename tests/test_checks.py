@@ -1,0 +1,178 @@
+"""Rows by hand arithmetic, and what missing data does to a verdict."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from boom_model import Basis, Boom, InputError, Origin, Sourced, inverse_dynamics
+from planner import Trajectory, Verdict, average_torque, check, plan, sample
+from planner.validation import table_2_4_motion
+
+BOOM = Boom.load()
+PATH = sample(table_2_4_motion(BOOM), 0.001)
+
+
+def rows_of(report, joint, check_name):
+    return next(r for r in report.rows if (r.joint, r.check) == (joint, check_name))
+
+
+def with_drives(**changes) -> Boom:
+    """The boom with a change of both drives' fields."""
+    return replace(BOOM, drives=tuple(d and replace(d, **changes) for d in BOOM.drives))
+
+
+def held_still(q, samples=3) -> Trajectory:
+    zero = np.zeros((samples, 5))
+    return Trajectory.from_samples(np.arange(samples), np.tile(q, (samples, 1)), zero, zero)
+
+
+def test_average_torque_of_a_constant_is_the_constant():
+    t = np.linspace(0.0, 2.0, 50)
+    assert average_torque(t, np.full(50, -80.0), np.sin(t)) == pytest.approx(80.0, rel=1e-12)
+
+
+def test_average_torque_is_the_speed_weighted_cube_mean():
+    """100 Nm at 1 rad/s for 1 s and 50 Nm at 3 rad/s for 1 s: ((1e6 + 3 x 1.25e5) / 4)^(1/3) = 70.05 Nm."""
+    t = np.array([0.0, 1.0, 1.0 + 1e-12, 2.0])
+    torque, speed = np.array([100.0, 100.0, 50.0, 50.0]), np.array([1.0, 1.0, 3.0, 3.0])
+    assert average_torque(t, torque, speed) == pytest.approx(((1e6 + 3 * 1.25e5) / 4) ** (1 / 3), rel=1e-9)
+
+
+@pytest.mark.parametrize(("joint", "expected"), [("inner", 102.0), ("lower", 105.3)])
+def test_average_torque_on_table_2_4(joint, expected):
+    report = check(BOOM, PATH, payload_as="force")
+    assert rows_of(report, joint, "gearbox average").demand == pytest.approx(expected, abs=0.05)
+
+
+def test_motor_rows_on_table_2_4_by_hand():
+    """At 10 s joint 2 rests under 155.832 Nm: 155.832 / 160 = 0.974 Nm to hold. Its inner link falls all the way, so the
+    load drives it forwards; the move reversed lifts it, at most 155.832 / (160 x 0.65) + 0.42 = 1.918 Nm and the share of the
+    inertia."""
+    report = check(BOOM, PATH, payload_as="force")
+    assert rows_of(report, "inner", "motor hold").demand == pytest.approx(155.832 / 160, abs=5e-3)
+    lift = rows_of(report, "inner", "motor torque, reversed")
+    inertia = (4e-4 + 1.76e-4) * 160 * np.radians(45) * 6 / 100
+    assert lift.demand == pytest.approx(155.832 / (160 * 0.65) + 0.42 + inertia, abs=2e-3)
+    assert lift.limit == 7.2
+    assert lift.margin == pytest.approx((7.2 - lift.demand) / lift.demand, rel=1e-12)
+
+
+def test_rows_take_the_absolute_torque_and_its_time():
+    """tau4 of table 2-4's path is negative at its largest: -63.55 N at 10 s."""
+    row = rows_of(check(BOOM, PATH, payload_as="force"), "extension", "drive peak force")
+    assert row.demand == pytest.approx(63.551, abs=1e-3)
+    assert row.at_s == pytest.approx(10.0)
+
+
+def test_joints_without_a_drive_are_never_passed():
+    report = check(BOOM, PATH)
+    for joint in ("yaw", "extension", "wrist"):
+        drive_rows = [r for r in report.rows if r.joint == joint and r.check.startswith("drive")]
+        assert len(drive_rows) == 5
+        assert {r.verdict for r in drive_rows} == {Verdict.NOT_CHECKABLE}
+        assert {r.source for r in drive_rows} == {"NOT CHECKED: no drive data"}
+    assert report.verdict is Verdict.INCOMPLETE
+
+
+@pytest.mark.parametrize("missing", ["bus_voltage", "wiring"])
+def test_without_voltage_or_wiring_only_low_speed_is_judged(missing):
+    boom = with_drives(**{missing: None})
+    fast = plan(boom, "transport", "phenotyping").report
+    for name in ("motor torque", "motor torque, reversed", "motor speed"):
+        assert rows_of(fast, "lower", name).verdict is Verdict.NOT_CHECKABLE
+    slow = plan(boom, "transport", "phenotyping", duration=120.0).report
+    assert rows_of(slow, "lower", "motor torque").verdict is Verdict.PASS
+    assert rows_of(slow, "lower", "motor torque").basis is Basis.PRINTED
+
+
+def test_a_motor_too_weak_fails_even_without_voltage():
+    weak = replace(BOOM.drives[1].motor, running_torque=1.0)
+    report = check(with_drives(bus_voltage=None, motor=weak), PATH)
+    assert rows_of(report, "inner", "motor torque, reversed").verdict is Verdict.FAIL
+
+
+@pytest.mark.parametrize(
+    "figure", ["efficiency", "no_load_input_torque", "input_inertia", "start_stop_torque", "max_average_torque"]
+)
+def test_a_missing_gearbox_figure_is_not_checkable(figure):
+    report = check(with_drives(gearbox=replace(BOOM.drives[1].gearbox, **{figure: None})), PATH)
+    concerned = {"start_stop_torque": "gearbox repeated peak", "max_average_torque": "gearbox hold"}.get(figure, "motor torque")
+    assert rows_of(report, "inner", concerned).verdict is Verdict.NOT_CHECKABLE
+
+
+def test_more_torque_never_improves_a_verdict():
+    order = [Verdict.PASS, Verdict.WARN, Verdict.FAIL]
+    seen = {}
+    for payload in np.linspace(0.0, 60.0, 25):
+        for row in check(BOOM.with_payload(payload), PATH).rows:
+            if row.joint in ("inner", "lower") and row.verdict in order:
+                key, rank = (row.joint, row.check), order.index(row.verdict)
+                assert rank >= seen.get(key, 0), key
+                seen[key] = rank
+    assert max(seen.values()) == 2
+
+
+def test_the_curve_gives_no_clean_pass_near_it():
+    """At the speed and torque where the margin is between 50 and 75 %: WARN; below: FAIL; and its basis is assumed."""
+    verdicts = []
+    for payload in (10.0, 20.0, 24.0):
+        row = rows_of(
+            check(BOOM.with_payload(payload), plan(BOOM, "transport", "phenotyping").trajectory), "lower", "motor torque"
+        )
+        verdicts.append(row.verdict)
+        assert row.basis is Basis.ASSUMED
+    assert verdicts == [Verdict.PASS, Verdict.WARN, Verdict.FAIL]
+
+
+def test_printed_voltage_and_wiring_leave_the_curve_an_estimate():
+    printed = Origin(Basis.PRINTED, "name plate")
+    drive = BOOM.drives[1]
+    boom = with_drives(bus_voltage=Sourced(80.0, printed), wiring=Sourced(drive.wiring.value, printed))
+    assert rows_of(plan(boom, "transport", "phenotyping").report, "lower", "motor torque").basis is Basis.ESTIMATED
+
+
+def test_hold_row_is_the_static_torque_of_the_worst_pose():
+    q = BOOM.pose("phenotyping")
+    row = rows_of(check(BOOM, held_still(q)), "lower", "gearbox hold")
+    assert row.demand == pytest.approx(inverse_dynamics(BOOM, q, np.zeros(5), np.zeros(5)).tau[2], rel=1e-12)
+    assert not any(r.check == "gearbox average" for r in check(BOOM, held_still(q)).rows)
+
+
+@pytest.mark.parametrize(
+    ("degrees", "joint", "name"),
+    [
+        ([0, 130, 180, 0, 0], "inner", "position"),
+        ([0, 50, 52, 0, 0], "lower", "lower - inner"),
+        ([0, 0, 90, 0, -91], "wrist", "position"),
+    ],
+)
+def test_states_outside_the_limits_are_reported_not_refused(degrees, joint, name):
+    report = check(BOOM, held_still(np.radians(degrees)))
+    row = rows_of(report, joint, name)
+    assert row.verdict is Verdict.FAIL
+    assert row.margin == pytest.approx(BOOM.limits.excess(np.radians(degrees)).max() * -1, abs=1e-15)
+    assert report.verdict is Verdict.FAIL
+
+
+@pytest.mark.parametrize("name", ["velocity", "acceleration"])
+def test_rates_beyond_their_limit_fail(name):
+    limit = getattr(BOOM.limits, name)
+    for share, verdict in ((0.999, Verdict.PASS), (1.01, Verdict.FAIL)):
+        rates = {"qd": np.zeros((2, 5)), "qdd": np.zeros((2, 5))}
+        rates["qd" if name == "velocity" else "qdd"][1] = -share * limit
+        report = check(BOOM, Trajectory.from_samples([0.0, 1.0], np.tile(BOOM.pose("transport"), (2, 1)), **rates))
+        assert {rows_of(report, joint, name).verdict for joint in ("yaw", "extension")} == {verdict}
+
+
+def test_jerk_is_checked_where_it_was_limited():
+    checks = {
+        p: {r.check for r in plan(BOOM, "transport", "phenotyping", profile=p).report.rows} for p in ("cubic", "jerk-limited")
+    }
+    assert "jerk" in checks["jerk-limited"]
+    assert "jerk" not in checks["cubic"]
+
+
+def test_payload_as_is_checked():
+    with pytest.raises(InputError, match="payload_as"):
+        check(BOOM, PATH, payload_as="weight")

@@ -1,0 +1,39 @@
+"""The thesis's tables."""
+
+from dataclasses import replace
+
+import pytest
+
+from boom_model import Boom
+from planner.validation import validate
+
+BOOM = Boom.load()
+
+
+def test_every_row_holds():
+    rows = validate(BOOM)
+    assert [row for row in rows if not row.ok] == []
+    assert {t: sum(r.table == t for r in rows) for t in ("2-5", "2-6", "2-7", "2-8")} == {
+        "2-5": 20,
+        "2-6": 33,
+        "2-7": 40,
+        "2-8": 55,
+    }
+
+
+def test_known_slips_hold_the_corrected_value_and_say_so():
+    corrected = [row for row in validate(BOOM) if "corrected" in row.note]
+    assert len(corrected) == 12
+    assert {row.quantity for row in corrected} == {"yaw [rad]", "tau1 [Nm]"}
+
+
+@pytest.mark.parametrize(
+    ("change", "tables"),
+    [
+        ({"geometry": replace(BOOM.geometry, L6=0.0425)}, {"2-6", "2-7", "2-8"}),
+        ({"gravity": 9.8}, {"2-8"}),
+        ({"bodies": BOOM.bodies | {"upper": replace(BOOM.bodies["upper"], mass=2.978)}}, {"2-8"}),
+    ],
+)
+def test_a_slightly_wrong_model_breaks_rows(change, tables):
+    assert {row.table for row in validate(replace(BOOM, **change)) if not row.ok} == tables
