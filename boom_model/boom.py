@@ -69,8 +69,10 @@ class Limits:
     jerk: Array
     linkage: float
     """Coupled limit: theta3 - theta2 may not fall below this [rad]."""
+    transmission: float
+    """Transmission angle [rad] below which the flattening parallelogram's pin forces deserve a warning."""
     origins: Mapping[str, tuple[Origin, ...]]
-    """Origin of every figure: keys position, velocity, acceleration and jerk (5 each), linkage (1)."""
+    """Origin of every figure: keys position, velocity, acceleration and jerk (5 each), linkage and transmission (1)."""
 
     def excess(self, q: ArrayLike) -> Array:
         """How far q is outside each position limit, shape (..., 6); negative inside.
@@ -106,6 +108,18 @@ class Limits:
 
 
 @dataclass(frozen=True, eq=False)
+class Friction:
+    """Joint friction, viscous qd + coulomb sign(qd); arrays (5,), 0 where none is given."""
+
+    viscous: Array
+    """[Nm s/rad, the extension's N s/m]"""
+    coulomb: Array
+    """[Nm, the extension's N]"""
+    origins: tuple[Origin | None, ...]
+    """Of each joint's pair; None where none is given."""
+
+
+@dataclass(frozen=True, eq=False)
 class Boom:
     """A five-joint boom on a parallelogram linkage."""
 
@@ -113,13 +127,14 @@ class Boom:
     geometry: Geometry
     bodies: Mapping[str, Body]
     """base, and each of MOVING_BODIES."""
-    payload: float
-    """Mass at the tip [kg]."""
+    payload: Body
+    """In frame 11, the tip."""
     limits: Limits
     drives: tuple[Drive | None, ...]
     """One a joint; None where no drive is given, and then nothing about it can be checked."""
     poses: Mapping[str, Array]
     """Named joint positions, each (5,)."""
+    friction: Friction
     gravity: float = 9.81
     """[m/s^2]"""
 
@@ -139,7 +154,7 @@ class Boom:
         return read_boom(path, catalogue)
 
     def with_payload(self, mass: float) -> "Boom":
-        """The same boom with another payload [kg].
+        """The same boom with a payload of another mass [kg]: same centre of mass, inertia in proportion.
 
         Raises:
             InputError: not finite, or negative.
@@ -147,7 +162,9 @@ class Boom:
         mass = scalar("payload", mass)
         if mass < 0:
             raise InputError(f"payload is {mass} kg; it must be at least 0 kg")
-        return replace(self, payload=mass)
+        old = self.payload
+        inertia = old.inertia * (mass / old.mass) if old.mass > 0.0 else old.inertia
+        return replace(self, payload=Body(mass, old.com, read_only(inertia)))
 
     def pose(self, name: str) -> Array:
         """The named pose, (5,).

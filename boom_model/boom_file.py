@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from boom_model.arrays import Array, checked, read_only
-from boom_model.boom import JOINTS, MOVING_BODIES, Body, Boom, Geometry, Limits
+from boom_model.boom import JOINTS, MOVING_BODIES, Body, Boom, Friction, Geometry, Limits
 from boom_model.catalogue import CATALOGUE_FILE, Catalogue
 from boom_model.drives import Drive, Wiring
 from boom_model.errors import InputError
@@ -90,6 +90,26 @@ class _DriveTable(Table):
     gearbox: str
     bus_voltage_V: _Sourced[Positive] | None = None
     wiring: _Sourced[Literal["parallel", "series"]] | None = None
+    brake: _Sourced[bool] | None = None
+
+
+class _RevoluteFriction(_Origin):
+    viscous_Nm_s_per_rad: NonNegative
+    coulomb_Nm: NonNegative
+
+    @property
+    def pair(self) -> tuple[float, float]:
+        """Viscous and Coulomb."""
+        return self.viscous_Nm_s_per_rad, self.coulomb_Nm
+
+
+class _PrismaticFriction(_Origin):
+    viscous_N_s_per_m: NonNegative
+    coulomb_N: NonNegative
+
+    @property
+    def pair(self) -> tuple[float, float]:
+        return self.viscous_N_s_per_m, self.coulomb_N
 
 
 class _RevoluteTable(Table):
@@ -97,6 +117,7 @@ class _RevoluteTable(Table):
     velocity_deg_s: _Sourced[Positive]
     acceleration_deg_s2: _Sourced[Positive]
     jerk_deg_s3: _Sourced[Positive]
+    friction: _RevoluteFriction | None = None
     drive: _DriveTable | None = None
 
     @property
@@ -111,6 +132,7 @@ class _PrismaticTable(Table):
     velocity_m_s: _Sourced[Positive]
     acceleration_m_s2: _Sourced[Positive]
     jerk_m_s3: _Sourced[Positive]
+    friction: _PrismaticFriction | None = None
 
     @property
     def rows(self) -> tuple[_Range, _Sourced[float], _Sourced[float], _Sourced[float], float]:
@@ -137,10 +159,13 @@ class _BodiesTable(Table):
 
 class _LinkageTable(Table):
     minimum_angle_deg: _Sourced[NonNegative]
+    transmission_warning_deg: _Sourced[NonNegative]
 
 
 class _PayloadTable(_Origin):
     mass_kg: NonNegative
+    com_m: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    inertia_kg_m2: Annotated[Any, AfterValidator(_inertia)] = Field(default_factory=lambda: read_only(np.zeros((3, 3))))
 
 
 class _PoseTable(Table):
@@ -174,8 +199,9 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
         gravity=table.gravity_m_s2,
         geometry=Geometry(L1=g.L1_m, L2=g.L2_m, L3=g.L3_m, L4=g.L4_m, L6=g.L6_m, L7=g.L7_m, L8=g.L8_m),
         bodies=MappingProxyType({name: _body(getattr(table.bodies, name)) for name in ("base", *MOVING_BODIES)}),
-        payload=table.payload.mass_kg,
-        limits=_limits(joints, table.linkage.minimum_angle_deg),
+        payload=_body(table.payload),
+        friction=_friction(joints),
+        limits=_limits(joints, table.linkage),
         drives=tuple(
             _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), known, catalogue)
             for name, joint in zip(JOINTS, joints, strict=True)
@@ -184,22 +210,31 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
     )
 
 
-def _body(table: _BodyTable) -> Body:
+def _body(table: _BodyTable | _PayloadTable) -> Body:
     return Body(table.mass_kg, read_only(table.com_m), table.inertia_kg_m2)
 
 
-def _limits(joints: list[Any], linkage: _Sourced[float]) -> Limits:
+def _friction(joints: list[Any]) -> Friction:
+    tables = [joint.friction for joint in joints]
+    viscous, coulomb = zip(*((0.0, 0.0) if t is None else t.pair for t in tables), strict=True)
+    origins = tuple(None if t is None else t.origin for t in tables)
+    return Friction(read_only(viscous), read_only(coulomb), origins)
+
+
+def _limits(joints: list[Any], linkage: _LinkageTable) -> Limits:
     position, velocity, acceleration, jerk, unit = zip(*(joint.rows for joint in joints), strict=True)
     rates = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk}
     return Limits(
         lower=read_only([p.lower * u for p, u in zip(position, unit, strict=True)]),
         upper=read_only([p.upper * u for p, u in zip(position, unit, strict=True)]),
-        linkage=linkage.value * np.pi / 180.0,
+        linkage=linkage.minimum_angle_deg.value * np.pi / 180.0,
+        transmission=linkage.transmission_warning_deg.value * np.pi / 180.0,
         **{name: read_only([r.value * u for r, u in zip(row, unit, strict=True)]) for name, row in rates.items()},
         origins=MappingProxyType(
             {
                 "position": tuple(p.origin for p in position),
-                "linkage": (linkage.origin,),
+                "linkage": (linkage.minimum_angle_deg.origin,),
+                "transmission": (linkage.transmission_warning_deg.origin,),
                 **{name: tuple(r.origin for r in row) for name, row in rates.items()},
             }
         ),
@@ -225,6 +260,7 @@ def _drive(file: Path, key: str, table: _DriveTable | None, known: Catalogue, ca
         gearbox=known.gearboxes[table.gearbox],
         bus_voltage=None if voltage is None else voltage.sourced,
         wiring=None if wiring is None else Sourced(Wiring(wiring.value), wiring.origin),
+        brake=None if table.brake is None else table.brake.sourced,
     )
 
 

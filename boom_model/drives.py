@@ -91,6 +91,8 @@ class Drive:
     gearbox: Gearbox
     bus_voltage: Sourced[float] | None
     wiring: Sourced[Wiring] | None
+    brake: Sourced[bool] | None = None
+    """Whether a brake holds the joint without power; None where nobody says."""
 
     @property
     def winding(self) -> Winding | None:

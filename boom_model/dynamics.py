@@ -1,13 +1,18 @@
-"""Newton-Euler over the closed linkage: joint torques, pin forces and the wrench on the vehicle's mount.
+"""Newton-Euler over the closed linkage with regrouped inertial parameters: joint torques, pin forces, mount wrench.
 
 Every body is followed in the arm's plane, which yaws with theta1: axes x forward, z up and n = x cross z, the plane's normal
 (to the boom's right), origin in frame 1. A link at angle a has its own axes e = (cos a, sin a, 0), p = (-sin a, cos a, 0)
-and n. The plane turns with angular velocity W (the vehicle's, and theta1's rate about z), so a point c of the plane has
+and n. Any mass element then stands at c = sum_i g_i b_i, with constants g_i and the eleven vectors
 
-    a = a0 + W' x c + W x (W x c) + 2 W x c' + c''      (thesis, eqs. 2.41, 2.42 and 2.44 as corrected)
+    b = o, x, z, n, e2, p2, e3, p3, rho e3, et, pt      (o the origin itself; 2, 3, t: theta2, theta3, theta3 + theta5)
 
-with a0 the base's acceleration less gravity, and each body needs F = m a and N = J w' + w x J w (eqs. 2.45, 2.46). The
-equilibrium of extension, upper, outer, inner and lower link then gives the pins and the joint torques.
+and its acceleration less gravity is sum_i g_i A_i. With the plane's angular velocity W and the base's acceleration a0,
+
+    A_o = a0 - gravity,   A_i = W' x b + W x (W x b) + 2 W x b' + b''      (thesis, eqs. 2.41, 2.42 and 2.44 as corrected).
+
+Newton's and Euler's equations of a set of bodies ask no more of its masses than the constant Q = int g g^T dm: with
+U = Q A, the force on the set is U_o, and its moment about any pin a sum of b_i x U_i. The equilibrium of tool, extension,
+upper, outer, inner and lower link gives the joint torques and the pin forces from these (eqs. 2.45-2.71).
 """
 
 from dataclasses import dataclass
@@ -17,8 +22,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model.arrays import Array, broadcast, read_only
+from boom_model.arrays import Array, broadcast, checked, read_only
+from boom_model.base_motion import BaseMotion
 from boom_model.boom import Body, Boom
+from boom_model.drives import reflected_inertia
 from boom_model.errors import InputError
 from boom_model.frames import R_LINK_BODY
 
@@ -26,13 +33,16 @@ PayloadAs = Literal["mass", "force"]
 
 _CHUNK = 2048  # samples at once: the working arrays of a chunk stay in the processor's cache
 
+_O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
+_LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
+
 
 @dataclass(frozen=True, eq=False)
 class PinForces:
     """Forces at the linkage's pins [N], each (..., 3) in frame 4: x forward, y to the left, z up, yawing with theta1.
 
-    They lie in the arm's plane: how pins 7 and 8 share the lateral load is statically indeterminate, so y is 0. They grow
-    as 1/sin(theta3 - theta2) towards the flat parallelogram, and are infinite or NaN there.
+    They lie in the arm's plane: how pins 7 and 8 share the load across it is statically indeterminate, so y is 0. They grow
+    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right: see `transmission_angle`.
     """
 
     frame_6: Array
@@ -61,259 +71,303 @@ def inverse_dynamics(
     qd: ArrayLike,
     qdd: ArrayLike,
     *,
+    base: BaseMotion | None = None,
     payload_as: PayloadAs = "mass",
+    tip_force: ArrayLike | None = None,
+    tip_moment: ArrayLike | None = None,
+    friction: bool = False,
+    drive_inertia: bool = False,
     reactions: bool = True,
 ) -> Loads:
     """Joint torques, pin forces and mount wrench for a motion, by Newton-Euler (thesis, eqs. 2.45-2.71 as corrected).
 
-    Frictionless, rigid, on a base at rest.
-
     Args:
         q, qd, qdd: (..., 5) joint positions, velocities, accelerations [rad, the extension in m]; they broadcast.
-        payload_as: "mass" accelerates the payload with the tip; "force" hangs its weight there and leaves its inertia out,
-            as the thesis does.
-        reactions: whether to compute pin forces and mount wrench too.
+        base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level ground.
+        payload_as: "mass" moves the payload with the tip; "force" hangs its weight there and leaves its inertia out, as the
+            thesis does.
+        tip_force, tip_moment: (..., 3) force [N] and moment [Nm] that the surroundings put on the tip, along frame 1.
+        friction: whether tau overcomes the joints' friction, viscous qd + coulomb sign(qd).
+        drive_inertia: whether tau accelerates the drives' reflected inertia N^2 (J_rotor + J_gear) too, where it is known.
+            Friction and drive inertia are added to tau alone; their reaction on the pins and the mount is left out.
+        reactions: whether to compute pin forces and mount wrench.
 
     Raises:
-        InputError: an input is not finite or not (..., 5), or shapes do not match.
+        InputError: an input is not finite or of the wrong shape, or shapes do not match.
     """
     if payload_as not in ("mass", "force"):
         raise InputError(f"payload_as is {payload_as!r}; it must be 'mass' or 'force'")
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]
+    moving = [] if base is None else [base.angular_velocity, base.angular_acceleration, base.acceleration, base.up]
+    outside = [_vectors(f"base entry {i}", x, shape) for i, x in enumerate(moving)]
+    push = None if tip_force is None else _vectors("tip_force", tip_force, shape)
+    twist = None if tip_moment is None else _vectors("tip_moment", tip_moment, shape)
     count = len(motion[0])
-    tau = np.empty((count, 5))
-    pins = np.zeros((3, count, 3)) if reactions else None
-    mount = np.empty((count, 6)) if reactions else None
+    out = _Outputs(
+        np.empty((count, 5)),
+        np.zeros((3, count, 3)) if reactions else None,
+        np.empty((count, 6)) if reactions else None,
+    )
     model = _model(boom, payload_as)
     for start in range(0, count, _CHUNK):
         part = slice(start, start + _CHUNK)
-        p, v, a = (np.ascontiguousarray(x[part].T) for x in motion)
-        outputs = (tau[part], None if pins is None else pins[:, part], None if mount is None else mount[part])
-        _newton_euler(model, p, v, a, *outputs)
+        state = _State(*(np.ascontiguousarray(x[part].T) for x in motion))
+        plane = _plane(boom, state, *(x[part].T for x in outside))
+        applied = _Applied(*(None if x is None else _into_plane(state, x[part].T) for x in (push, twist)))
+        _newton_euler(model, state, plane, applied, out.part(part))
+    tau = out.tau
+    if friction:
+        tau += boom.friction.viscous * motion[1] + boom.friction.coulomb * np.sign(motion[1])
+    if drive_inertia:
+        tau += np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) * motion[2]
     return Loads(
         tau=tau.reshape(*shape, 5),
-        pins=None if pins is None else PinForces(*(p.reshape(*shape, 3) for p in pins)),
-        mount=None if mount is None else mount.reshape(*shape, 6),
+        pins=None if out.pins is None else PinForces(*(p.reshape(*shape, 3) for p in out.pins)),
+        mount=None if out.mount is None else out.mount.reshape(*shape, 6),
     )
 
 
-class _LinkBody(NamedTuple):
-    """A body in its link's axes (e, p, n), about the link's own pivot."""
+def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
+    """Force (..., 3) [N] that the inner link carries at its upper pin, in frame 5 of the inner loop: x along the link.
 
-    mass: float
-    com: tuple[float, float, float]
-    inertia: tuple[float, float, float, float, float, float]
-    """about the centre of mass: ee, pp, nn, ep, en, pn"""
+    Chapter 3's f_B: the reaction to the inner link's force on the upper link at frame 8.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    theta2 = checked("q", q, 5)[..., 1]
+    c, s = np.cos(theta2), np.sin(theta2)
+    x, z = pins.frame_8[..., 0], pins.frame_8[..., 2]
+    return np.stack([-(c * x + s * z), s * x - c * z, np.zeros_like(x)], axis=-1)
 
 
 class _Model(NamedTuple):
+    """The boom's masses, regrouped."""
+
     boom: Boom
-    base: _LinkBody
-    lower: _LinkBody
-    inner: _LinkBody
-    outer: _LinkBody
-    upper: _LinkBody
-    extension: _LinkBody
-    tool: _LinkBody
-    """end effector, with the payload where it has mass"""
+    rows: Array
+    """(17, 11): Q of all bodies; then Q of the outer link (o, e2, p2) and of all beyond pins 7 and 8 (o, e3, p3)."""
+    tip: Array
+    """(11,) g of the tip."""
+    payload: Array
+    """(11,) g of the payload's centre of mass."""
     hanging: float
-    """payload that is a force [kg]"""
+    """Payload that is a force [kg]."""
 
 
 @lru_cache(maxsize=16)
 def _model(boom: Boom, payload_as: PayloadAs) -> _Model:
-    links = {name: _in_link_axes(body, R_LINK_BODY[name]) for name, body in boom.bodies.items()}
-    tool = links.pop("end_effector")
-    if payload_as == "mass" and boom.payload > 0:
-        tip = np.array([0.0, boom.geometry.L8, 0.0])
-        mass = tool.mass + boom.payload
-        com = (tool.mass * tool.com + boom.payload * tip) / mass
-        inertia = tool.inertia + _point_inertia(tool.mass, tool.com - com) + _point_inertia(boom.payload, tip - com)
-        tool = Body(mass, com, inertia)
+    elements = _elements(boom)
+    bodies = {**boom.bodies, "payload": boom.payload}
+    Q = {name: elements[name].T @ _pseudo_inertia(body, R_LINK_BODY[name]) @ elements[name] for name, body in bodies.items()}
+    if payload_as == "force":
+        Q["payload"] = np.zeros((11, 11))
+    top = sum((Q[name] for name in ("upper", "extension", "end_effector", "payload")), np.zeros((11, 11)))
+    rows = [sum(Q.values(), np.zeros((11, 11))), Q["outer"][[_O, _E2, _P2]], top[[_O, _E3, _P3]]]
+    com = R_LINK_BODY["payload"] @ boom.payload.com
     return _Model(
         boom=boom,
-        tool=_flat(tool),
-        hanging=boom.payload if payload_as == "force" else 0.0,
-        **{name: _flat(body) for name, body in links.items()},
+        rows=read_only(np.concatenate(rows)),
+        tip=elements["payload"][0],
+        payload=elements["payload"].T @ [1.0, *com],
+        hanging=boom.payload.mass if payload_as == "force" else 0.0,
     )
 
 
-def _in_link_axes(body: Body, R: Array) -> Body:
-    return Body(body.mass, read_only(R @ body.com), read_only(R @ body.inertia @ R.T))
+def _elements(boom: Boom) -> dict[str, Array]:
+    """g of each body's frame origin, and what a metre along its link's e, p and n adds: (4, 11) a body."""
+    g, unit = boom.geometry, np.eye(11)
+    shoulder = unit[_O] + g.L2 * unit[_X] + g.L1 * unit[_Z]
+    pin6 = shoulder + g.L3 * unit[_E3]
+    pin8 = shoulder + g.L9 * unit[_E2]
+    wrist = pin8 - g.L6 * unit[_P3] - unit[_RHO]
+    placed = {
+        "base": (unit[_O], _X, _Z),
+        "lower": (shoulder, _E3, _P3),
+        "inner": (shoulder, _E2, _P2),
+        "outer": (pin6, _E2, _P2),
+        "upper": (pin8, _E3, _P3),
+        "extension": (wrist, _E3, _P3),
+        "end_effector": (wrist, _ET, _PT),
+        "payload": (wrist + g.L8 * unit[_PT], _ET, _PT),
+    }
+    return {name: np.stack([origin, unit[e], unit[p], unit[_N]]) for name, (origin, e, p) in placed.items()}
 
 
-def _point_inertia(mass: float, arm: Array) -> Array:
-    inertia: Array = mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return inertia
+def _pseudo_inertia(body: Body, R: Array) -> Array:
+    """int (1, r) (1, r)^T dm over a body, r along its link's axes: (4, 4)."""
+    com, inertia = R @ body.com, R @ body.inertia @ R.T
+    moments = np.empty((4, 4))
+    moments[0, 0] = body.mass
+    moments[0, 1:] = moments[1:, 0] = body.mass * com
+    moments[1:, 1:] = 0.5 * np.trace(inertia) * np.eye(3) - inertia + body.mass * np.outer(com, com)
+    return moments
 
 
-def _flat(body: Body) -> _LinkBody:
-    i = body.inertia
-    com = (float(body.com[0]), float(body.com[1]), float(body.com[2]))
-    tensor = (i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])
-    return _LinkBody(body.mass, com, tuple(map(float, tensor)))  # type: ignore[arg-type]
+class _State(NamedTuple):
+    """A chunk of states, each (5, n)."""
+
+    q: Array
+    qd: Array
+    qdd: Array
 
 
-class _Point(NamedTuple):
-    """A point of the plane: position, and velocity and acceleration as seen from the plane."""
+class _Plane(NamedTuple):
+    """How the arm's plane moves, along its axes x, z and n; three entries (n,) or 0 each."""
 
-    x: Array | float
-    z: Array | float
-    vx: Array | float = 0.0
-    vz: Array | float = 0.0
-    ax: Array | float = 0.0
-    az: Array | float = 0.0
+    lift: tuple[Array | float, Array | float, Array | float]
+    """minus gravity"""
+    a: tuple[Array | float, Array | float, Array | float]
+    """a0 minus gravity"""
+    W: tuple[Array | float, Array, Array | float]
+    W1: tuple[Array | float, Array, Array | float]
 
 
-class _Link(NamedTuple):
-    """A link's angle: cosine and sine, rate, acceleration."""
+class _Applied(NamedTuple):
+    """Force and moment on the tip along the plane's axes, (3, n) each."""
 
-    c: Array | float
-    s: Array | float
-    rate: Array | float
-    accel: Array | float
+    force: Array | None
+    moment: Array | None
 
-    def carry(self, pivot: _Point, u: float | Array, v: float) -> _Point:
-        """The point at u along e and v along p from the pivot."""
-        rx, rz = u * self.c - v * self.s, u * self.s + v * self.c
-        square = self.rate * self.rate
-        return _Point(
-            pivot.x + rx,
-            pivot.z + rz,
-            pivot.vx - self.rate * rz,
-            pivot.vz + self.rate * rx,
-            pivot.ax - self.accel * rz - square * rx,
-            pivot.az + self.accel * rx - square * rz,
+
+class _Outputs(NamedTuple):
+    tau: Array
+    pins: Array | None
+    """(3, n, 3)"""
+    mount: Array | None
+
+    def part(self, samples: slice) -> "_Outputs":
+        return _Outputs(
+            self.tau[samples],
+            None if self.pins is None else self.pins[:, samples],
+            None if self.mount is None else self.mount[samples],
         )
 
 
-class _Yaw(NamedTuple):
-    """How the plane itself moves: yaw rate and acceleration, and gravity."""
-
-    rate: Array
-    accel: Array
-    gravity: float
-
-
-class _Demand(NamedTuple):
-    """Force and moment that a body's motion needs, in the plane's axes, with where the force acts."""
-
-    x: Array | float
-    z: Array | float
-    n: float
-    Fx: Array
-    Fz: Array | float
-    Fn: Array
-    Nx: Array
-    Nz: Array
-    Nn: Array
-
-    def moment(self, pivot: _Point) -> Array:
-        """About the plane's normal through a pivot."""
-        return self.Nn + (self.x - pivot.x) * self.Fz - (self.z - pivot.z) * self.Fx
+def _vectors(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    values = checked(name, values, 3)
+    try:
+        return np.reshape(np.broadcast_to(values, (*shape, 3)), (-1, 3))
+    except ValueError:
+        raise InputError(f"{name} has shape {values.shape}; it does not match states of shape {(*shape, 5)}") from None
 
 
-def _demand(body: _LinkBody, link: _Link, com: _Point, yaw: _Yaw) -> _Demand:
-    n, W, W1 = body.com[2], yaw.rate, yaw.accel
-    Fx = body.mass * (com.ax - W * W * com.x + W1 * n)
-    Fz = body.mass * (com.az + yaw.gravity)
-    Fn = body.mass * (-W1 * com.x - W * W * n - 2.0 * W * com.vx)
-
-    # Angular velocity and acceleration along the link's axes: the plane's (about z) and the link's own (about n).
-    we, wp, wn = W * link.s, W * link.c, link.rate
-    ae, ap, an = W1 * link.s + wn * wp, W1 * link.c - wn * we, link.accel
-    ee, pp, nn, ep, en, pn = body.inertia
-    he, hp, hn = ee * we, pp * wp, nn * wn
-    Ne, Np, Nn = ee * ae, pp * ap, nn * an
-    if ep or en or pn:
-        he, hp, hn = he + ep * wp + en * wn, hp + ep * we + pn * wn, hn + en * we + pn * wp
-        Ne, Np, Nn = Ne + ep * ap + en * an, Np + ep * ae + pn * an, Nn + en * ae + pn * ap
-    Ne, Np, Nn = Ne + wp * hn - wn * hp, Np + wn * he - we * hn, Nn + we * hp - wp * he
-    return _Demand(com.x, com.z, n, Fx, Fz, Fn, Ne * link.c - Np * link.s, Ne * link.s + Np * link.c, Nn)
+def _into_plane(state: _State, vector: Array) -> Array:
+    """(3, n) along frame 1 to x, z and n of the plane."""
+    c, s = np.cos(state.q[0]), np.sin(state.q[0])
+    return np.stack([c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]])
 
 
-def _newton_euler(model: _Model, q: Array, qd: Array, qdd: Array, tau: Array, pins: Array | None, mount: Array | None) -> None:
-    """Fills tau (n, 5), pins (3, n, 3) and mount (n, 6) for a chunk of states, each (5, n)."""
-    g, still = model.boom.geometry, _Point(0.0, 0.0)
-    yaw = _Yaw(qd[0], qdd[0], model.boom.gravity)
-    angles = np.stack([q[1], q[2], q[2] + q[4]])
-    cosines, sines = np.cos(angles), np.sin(angles)
-    inner = _Link(cosines[0], sines[0], qd[1], qdd[1])
-    lower = _Link(cosines[1], sines[1], qd[2], qdd[2])
-    tool = _Link(cosines[2], sines[2], qd[2] + qd[4], qdd[2] + qdd[4])
-
-    shoulder = _Point(g.L2, g.L1)
-    pin6 = lower.carry(shoulder, g.L3, 0.0)
-    pin8 = inner.carry(shoulder, g.L9, 0.0)
-    slider = _slide(lower, lower.carry(pin8, 0.0, -g.L6), g.L7 + q[3], qd[3], qdd[3])
-
-    def needs(body: _LinkBody, link: _Link, pivot: _Point) -> _Demand:
-        return _demand(body, link, link.carry(pivot, body.com[0], body.com[1]), yaw)
-
-    on_base = needs(model.base, _Link(1.0, 0.0, 0.0, 0.0), still)
-    on_lower = needs(model.lower, lower, shoulder)
-    on_inner = needs(model.inner, inner, shoulder)
-    on_outer = needs(model.outer, inner, pin6)
-    on_upper = needs(model.upper, lower, pin8)
-    on_extension = needs(model.extension, lower, slider)
-    on_tool = needs(model.tool, tool, slider)
-    everything = [on_base, on_lower, on_inner, on_outer, on_upper, on_extension, on_tool]
-    tau5 = on_tool.moment(slider)
-    if model.hanging:
-        zero = np.zeros_like(q[0])
-        tip = tool.carry(slider, 0.0, g.L8)
-        weight = np.full_like(zero, model.hanging * model.boom.gravity)
-        hanging = _Demand(tip.x, tip.z, 0.0, zero, weight, zero, zero, zero, zero)
-        everything.append(hanging)
-        tau5 = tau5 + hanging.moment(slider)
-
-    outboard = everything[5:]  # what the actuator carries
-    top = everything[4:]  # what the pins 7 and 8 carry
-    Fx_top, Fz_top = sum(d.Fx for d in top), sum(d.Fz for d in top)
-    M_top = sum(d.moment(pin8) for d in top)
-    M_outer = on_outer.moment(pin6)
-
-    # Pin 7 lies L5 along the lower link's direction from pin 8 and L4 along the inner link's from pin 6. Moments about
-    # pin 8 and pin 6 give its force across either direction, which is all that the torques need:
-    # f7 . p_lower = M_top / L5 and f7 . p_inner = -M_outer / L4.
-    tau[:, 0] = sum(d.Nz + d.n * d.Fx - d.x * d.Fn for d in everything)
-    tau[:, 1] = on_inner.moment(shoulder) + g.L9 * (inner.c * Fz_top - inner.s * Fx_top) + M_outer
-    tau[:, 2] = on_lower.moment(shoulder) + g.L3 * (lower.c * on_outer.Fz - lower.s * on_outer.Fx) + M_top
-    tau[:, 3] = -lower.c * sum(d.Fx for d in outboard) - lower.s * sum(d.Fz for d in outboard)
-    tau[:, 4] = tau5
-
-    if pins is not None:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            sine = lower.s * inner.c - lower.c * inner.s
-            along_inner, along_lower = -M_top / (g.L5 * sine), -M_outer / (g.L4 * sine)
-            f7x = along_inner * inner.c + along_lower * lower.c
-            f7z = along_inner * inner.s + along_lower * lower.s
-        pins[0, :, 0], pins[0, :, 2] = on_outer.Fx + f7x, on_outer.Fz + f7z
-        pins[1, :, 0], pins[1, :, 2] = f7x, f7z
-        pins[2, :, 0], pins[2, :, 2] = Fx_top - f7x, Fz_top - f7z
-    if mount is not None:
-        Fx, Fz, Fn = (sum(getattr(d, k) for d in everything) for k in ("Fx", "Fz", "Fn"))
-        Mx = sum(d.Nx + d.z * d.Fn - d.n * d.Fz for d in everything)
-        Mn = sum(d.Nn + d.x * d.Fz - d.z * d.Fx for d in everything)
-        c1, s1 = np.cos(q[0]), np.sin(q[0])
-        for row, (along, normal) in ((0, (Fx, Fn)), (3, (Mx, Mn))):
-            mount[:, row] = -(c1 * along + s1 * normal)
-            mount[:, row + 1] = -(s1 * along - c1 * normal)
-        mount[:, 2] = -Fz
-        mount[:, 5] = -tau[:, 0]
-
-
-def _slide(lower: _Link, axis: _Point, rho: Array, speed: Array, accel: Array) -> _Point:
-    """The wrist: rho out along the actuator, which points along -e of the lower link (thesis, eq. 2.42)."""
-    wrist = lower.carry(axis, -rho, 0.0)
-    coriolis = 2.0 * lower.rate * speed
-    return _Point(
-        wrist.x,
-        wrist.z,
-        wrist.vx - speed * lower.c,
-        wrist.vz - speed * lower.s,
-        wrist.ax - accel * lower.c + coriolis * lower.s,
-        wrist.az - accel * lower.s - coriolis * lower.c,
+def _plane(boom: Boom, state: _State, *base: Array) -> _Plane:
+    rate, accel = state.qd[0], state.qdd[0]
+    if not base:
+        level = (0.0, boom.gravity, 0.0)
+        return _Plane(level, level, (0.0, rate, 0.0), (0.0, accel, 0.0))
+    angular_velocity, angular_acceleration, acceleration, up = (_into_plane(state, x) for x in base)
+    w1, w2, w3 = angular_velocity
+    d1, d2, d3 = angular_acceleration
+    lift = boom.gravity * up
+    a = acceleration + lift
+    # The yaw axis is the plane's z: W' = base's + theta1'' z + W_base x theta1' z (thesis, eq. 2.40).
+    return _Plane(
+        (lift[0], lift[1], lift[2]), (a[0], a[1], a[2]), (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1)
     )
+
+
+def _accelerations(state: _State, plane: _Plane, C: Array, S: Array, rho: Array) -> Array:
+    """A, the acceleration of each vector b: (11, 3, n) along x, z and n. C, S (3, n): cosine and sine of theta2, 3, t."""
+    A = np.zeros((11, 3, C.shape[1]))
+    w1, w2, w3 = plane.W
+    d1, d2, d3 = plane.W1
+    w11, w22, w33, w12, w13, w23 = w1 * w1, w2 * w2, w3 * w3, w1 * w2, w1 * w3, w2 * w3
+    A[_O] = np.stack(np.broadcast_arrays(*plane.a, C[0])[:3])
+    A[_X, 0], A[_X, 1], A[_X, 2] = -(w22 + w33), w12 + d3, w13 - d2
+    A[_Z, 0], A[_Z, 1], A[_Z, 2] = w12 - d3, -(w11 + w33), w23 + d1
+    A[_N, 0], A[_N, 1], A[_N, 2] = w13 + d2, w23 - d1, -(w11 + w22)
+    qd, qdd = state.qd, state.qdd
+    rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
+    for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
+        total, double = rate + w3, 2.0 * rate
+        square = total * total
+        along_x, along_z = square + w22, square + w11
+        less, more = accel + d3 - w12, accel + d3 + w12
+        k, m = double * w1 + w13 - d2, double * w2 + w23 + d1
+        A[e, 0] = -along_x * c - less * s
+        A[e, 1] = more * c - along_z * s
+        A[e, 2] = k * c + m * s
+        A[p, 0] = along_x * s - less * c
+        A[p, 1] = -more * s - along_z * c
+        A[p, 2] = m * c - k * s
+    c, s, slide = C[1], S[1], 2.0 * qd[3]
+    turning = slide * (qd[2] + w3)
+    A[_RHO] = rho * A[_E3]
+    A[_RHO, 0] += qdd[3] * c - turning * s
+    A[_RHO, 1] += qdd[3] * s + turning * c
+    A[_RHO, 2] += slide * (w1 * s - w2 * c)
+    return A
+
+
+def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied, out: _Outputs) -> None:
+    """Fills the outputs of a chunk."""
+    g, q = model.boom.geometry, state.q
+    rho = g.L7 + q[3]
+    angles = np.stack([q[1], q[2], q[2] + q[4]])
+    C, S = np.cos(angles), np.sin(angles)
+    A = _accelerations(state, plane, C, S, rho)
+    rows = model.rows if out.pins is not None else model.rows[:11]
+    U = (rows @ A.reshape(11, -1)).reshape(len(rows), 3, -1)
+    if model.hanging:
+        weight = [np.broadcast_to(-model.hanging * np.asarray(x), rho.shape) for x in plane.lift]
+        _put_on(U, model.payload, np.stack(weight))
+    if applied.force is not None:
+        _put_on(U, model.tip, applied.force)
+    moment = np.zeros((3, 1)) if applied.moment is None else applied.moment
+    (c2, c3, ct), (s2, s3, st) = C, S
+
+    def about(c: Array, s: Array, e: Array, p: Array) -> Array:
+        """(b_e x U_e + b_p x U_p) . n"""
+        turned: Array = c * (e[1] - p[0]) - s * (e[0] + p[1])
+        return turned
+
+    on_tool = about(ct, st, U[_ET], U[_PT]) - moment[2]
+    beyond_actuator = rho * (c3 * U[_RHO, 1] - s3 * U[_RHO, 0]) + on_tool
+    # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
+    reach = ((c2, _E2, -s2, _P2), (c3, _E3, -s3, _P3), (rho * c3, _RHO, 0.0, _O), (ct, _ET, -st, _PT))
+    out.tau[:, 0] = U[_N, 0] - U[_X, 2] - sum(a * U[i, 2] + b * U[j, 2] for a, i, b, j in reach) - moment[1]
+    out.tau[:, 1] = about(c2, s2, U[_E2], U[_P2])
+    out.tau[:, 2] = about(c3, s3, U[_E3], U[_P3]) + beyond_actuator
+    out.tau[:, 3] = c3 * U[_RHO, 0] + s3 * U[_RHO, 1]
+    out.tau[:, 4] = on_tool
+    if out.pins is None or out.mount is None:
+        return
+
+    # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from pin 6: the moments about
+    # pins 8 and 6 give the force at pin 7 across both directions, and the balance of forces the other two.
+    F_outer, F_top = U[11], U[14]
+    M_outer = about(c2, s2, U[12], U[13])
+    M_top = about(c3, s3, U[15], U[16]) + beyond_actuator
+    sine = s3 * c2 - c3 * s2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along_inner, along_lower = -M_top / (g.L5 * sine), -M_outer / (g.L4 * sine)
+        f7 = along_inner * np.stack([c2, s2]) + along_lower * np.stack([c3, s3])
+    for pin, force in enumerate((F_outer[:2] + f7, f7, F_top[:2] - f7)):
+        out.pins[pin, :, 0], out.pins[pin, :, 2] = force
+
+    rise = ((s2, _E2, c2, _P2), (s3, _E3, c3, _P3), (rho * s3, _RHO, 0.0, _O), (st, _ET, ct, _PT))
+    Mx = U[_Z, 2] - U[_N, 1] + sum(a * U[i, 2] + b * U[j, 2] for a, i, b, j in rise) - moment[0]
+    Mn = U[_X, 1] - U[_Z, 0] + out.tau[:, 1] + out.tau[:, 2]
+    c1, s1 = np.cos(q[0]), np.sin(q[0])
+    for row, (along, normal) in ((0, (U[_O, 0], U[_O, 2])), (3, (Mx, Mn))):
+        out.mount[:, row] = -(c1 * along + s1 * normal)
+        out.mount[:, row + 1] = -(s1 * along - c1 * normal)
+    out.mount[:, 2] = -U[_O, 1]
+    out.mount[:, 5] = -out.tau[:, 0]
+
+
+def _put_on(U: Array, g: Array, force: Array) -> None:
+    """Takes a force (3, n) at the point g off what the bodies need, in place."""
+    U[:11] -= g[:, None, None] * force
+    if len(U) > 11:
+        U[14:] -= g[[_O, _E3, _P3], None, None] * force

@@ -24,7 +24,7 @@ BODY_FRAMES: dict[str, tuple[Loop, int]] = {
     "extension": ("outer", 9),
     "end_effector": ("outer", 10),
 }
-"""The loop and the frame in which each body's centre of mass and inertia are given."""
+"""The loop and the frame in which each body's centre of mass and inertia are given; the payload's is frame 11, the tip."""
 
 R_LINK_BODY = {
     "base": read_only([[1, 0, 0], [0, 0, 1], [0, -1, 0]]),
@@ -34,10 +34,27 @@ R_LINK_BODY = {
     "upper": read_only([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]),
     "extension": read_only([[0, 0, -1], [1, 0, 0], [0, -1, 0]]),
     "end_effector": read_only([[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+    "payload": read_only([[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
 }
 """Rotation from a body's DH frame to its link axes (e, p, n): e at the link's angle from the arm's forward horizontal, p a
 quarter turn on, n the arm plane's normal. The link's angle is 0 for the base, theta2 for inner and outer, theta3 for lower,
-upper and extension, theta3 + theta5 for the end effector."""
+upper and extension, theta3 + theta5 for end effector and payload."""
+
+THETA_RATES = {
+    "inner": read_only(
+        [[1, 0, 0, 0, 0], *[[0] * 5] * 2, [0, 1, 0, 0, 0], [0, -1, 1, 0, 0], *[[0] * 5] * 3, [0, 0, 0, 0, 1], [0] * 5]
+    ),
+    "outer": read_only(
+        [
+            *([1, 0, 0, 0, 0], [0] * 5, [0] * 5, [0, 0, 1, 0, 0], [0, 1, -1, 0, 0]),
+            *([0, -1, 1, 0, 0], [0] * 5, [0] * 5, [0, 0, 0, 0, 1], [0] * 5),
+        ]
+    ),
+}
+"""How fast the theta_i of each row turns with the joints: d(theta_i)/dt = THETA_RATES[loop][i] @ qd, (10, 5)."""
+
+SLIDING_ROW = 7
+"""Index of the row whose d_i is the extension's: d(d_i)/dt = qd[3]."""
 
 
 def dh_rows(boom: Boom, q: ArrayLike, loop: Loop) -> Array:

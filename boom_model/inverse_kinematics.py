@@ -135,6 +135,8 @@ def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, hold: Hold
     Raises:
         InputError: an input is not finite or of the wrong shape.
     """
+    if not isinstance(hold, ActuatorAngle | FixedExtension):
+        raise InputError(f"hold is {hold!r}; it must be one of the holds of boom_model")
     position, pitch = checked("position", position, 3) + 0.0, checked("pitch", pitch)  # + 0.0 takes the sign off a zero
     try:
         x, y, z, pitch = np.broadcast_arrays(*np.moveaxis(position, -1, 0), pitch)
@@ -163,25 +165,24 @@ def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, hold: Hold
 def _closure(boom: Boom, hold: Hold, F: Array, G: Array, root: Array) -> tuple[Array, Array, Mask]:
     """theta3, rho, and whether the branch exists, each of F's shape."""
     g = boom.geometry
-    H = g.L9**2 - F**2 - G**2 - g.L6**2
-    scale = g.L9**2 + F**2 + G**2 + g.L6**2
     if isinstance(hold, FixedExtension):
+        H = g.L9**2 - F**2 - G**2 - g.L6**2
         rho = np.full_like(F, g.L7 + scalar("extension", hold.extension))
         d, e, f = 2.0 * (rho * G - F * g.L6), 2.0 * (rho * F + G * g.L6), H - rho**2
         amplitude = np.hypot(d, e)
-        room, scale = amplitude - np.abs(f), scale + rho**2
+        room, scale = amplitude - np.abs(f), g.L9**2 + F**2 + G**2 + g.L6**2 + rho**2
         ratio = np.divide(f, amplitude, out=np.zeros_like(f), where=amplitude > 0.0)
         theta3 = np.arctan2(d, e) + root * np.arccos(np.clip(ratio, -1.0, 1.0))
         exists = (room >= -_TANGENT * scale) & (amplitude > 0.0)
     else:
         theta3 = np.full_like(F, np.pi + scalar("elevation", hold.elevation))
         c3, s3 = np.cos(theta3), np.sin(theta3)
-        half_b, c = F * c3 + G * s3, 2.0 * g.L6 * (G * c3 - F * s3) - H
-        room = half_b**2 - c
+        half_b, scale = F * c3 + G * s3, np.full_like(F, g.L9**2)
+        room = g.L9**2 - (G * c3 - F * s3 + g.L6) ** 2  # half_b^2 - c, without the squares that cancel in it
         rho = -half_b + root * np.sqrt(np.maximum(room, 0.0))
         exists = room >= -_TANGENT * scale
     double = room <= _TANGENT * scale
-    return theta3, rho, exists & ~(double & (root < 0.0))
+    return theta3, rho, exists & np.isfinite(room) & ~(double & (root < 0.0))
 
 
 def _wrapped(boom: Boom, q: Array) -> Array:

@@ -67,8 +67,8 @@ def write_recording(path: str | Path, boom: Boom, trajectory: Trajectory, loads:
 def _encoded(boom: Boom, trajectory: Trajectory, loads: Loads, report: Report) -> bytes:
     """The whole .rrd.
 
-    It is put together in memory: Rerun's own file sink waits for ever on a full disk. Each recording has an id of its own,
-    as the viewer would merge two that share one.
+    It is put together in memory: once a write fails, as on a full disk, Rerun's own file sink (0.41) waits for ever. Each
+    recording has an id of its own, as the viewer would merge two that share one.
     """
     poses = body_transforms(boom, trajectory.q)
     plots = _plots(boom, trajectory, loads)
@@ -124,8 +124,8 @@ def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
         # A cylinder lies along z, and these bodies' z is the pins' direction n.
         pins = rr.Cylinders3D(centers=centers, lengths=0.16, radii=0.018, colors=PIN_COLOR, fill_mode="solid")
         log(f"world/boom/{name}/pins", pins, name)
-    if boom.payload > 0.0:
-        radius = (boom.payload / _STEEL * 0.75 / np.pi) ** (1.0 / 3.0)
+    if boom.payload.mass > 0.0:
+        radius = (boom.payload.mass / _STEEL * 0.75 / np.pi) ** (1.0 / 3.0)
         log("world/boom/tip", rr.Points3D([(0.0, 0.0, 0.0)], radii=radius, colors=PAYLOAD_COLOR), "tip")
 
 

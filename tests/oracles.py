@@ -95,7 +95,7 @@ def mujoco_model(boom: Boom, *, payload_as: PayloadAs = "mass", free_root: bool 
         bodies[link.body] = element
     payload = ElementTree.SubElement(bodies["end_effector"], "body", name="payload", pos=_text([g.L8, 0.0, 0.0]))
     if payload_as == "mass":
-        _inertial(payload, boom.payload, diaginertia=[0.0, 0.0, 0.0])
+        _inertial(payload, boom.payload.mass, diaginertia=[0.0, 0.0, 0.0])
     ElementTree.SubElement(payload, "site", name="tip")
     ElementTree.SubElement(bodies["outer"], "site", name="pin 7 of outer", pos=_text([g.L4, 0.0, 0.0]))
     ElementTree.SubElement(bodies["upper"], "site", name="pin 7 of upper", pos=_text([0.0, g.L5, 0.0]))
@@ -140,7 +140,7 @@ def pinocchio_model(boom: Boom, *, payload_as: PayloadAs = "mass", free_root: bo
         joints[link.body] = model.addJoint(joints[link.parent], joint, pose, link.body)
         model.appendBodyToJoint(joints[link.body], pinocchio.Inertia(body.mass, body.com, body.inertia), still)
     if payload_as == "mass":
-        payload = pinocchio.Inertia(boom.payload, _tip_in_wrist(boom), np.zeros((3, 3)))
+        payload = pinocchio.Inertia(boom.payload.mass, _tip_in_wrist(boom), np.zeros((3, 3)))
         model.appendBodyToJoint(joints["end_effector"], payload, still)
     return model
 
@@ -236,7 +236,7 @@ def textbook_needs(boom: Boom, q: Array, qd: Array, qdd: Array, *, payload_as: P
         needs[name] = Need(origin + R @ body.com, body.mass * R @ com_accel, R @ moment)
     R, origin = poses["tip"][:3, :3], poses["tip"][:3, 3]
     tip_accel = R @ motions["outer"][10].vd if payload_as == "mass" else boom.gravity * UP
-    return needs | {"tip": Need(origin, boom.payload * tip_accel, np.zeros(3))}
+    return needs | {"tip": Need(origin, boom.payload.mass * tip_accel, np.zeros(3))}
 
 
 def virtual_work(boom: Boom, q: Array, needs: Mapping[str, Need]) -> Array:
@@ -285,7 +285,7 @@ def _closed(needed: Array, G: Array) -> OracleLoads:
 
 
 def _hanging(boom: Boom, payload_as: PayloadAs) -> float:
-    return boom.payload if payload_as == "force" else 0.0
+    return boom.payload.mass if payload_as == "force" else 0.0
 
 
 def _tip_in_wrist(boom: Boom) -> Array:

@@ -64,7 +64,7 @@ def test_there_are_no_other_bodies():
 
 
 def test_payload_and_gravity():
-    assert BOOM.payload == 10.0
+    assert BOOM.payload.mass == 10.0
     assert BOOM.gravity == 9.81
 
 
@@ -136,7 +136,7 @@ def test_an_unknown_pose_is_bad_input():
 @pytest.mark.parametrize("payload", [0.0, 3.5])
 def test_another_payload_changes_nothing_else(payload):
     other = BOOM.with_payload(payload)
-    assert other.payload == payload
+    assert other.payload.mass == payload
     assert all(getattr(other, f.name) is getattr(BOOM, f.name) for f in fields(BOOM) if f.name != "payload")
 
 
@@ -217,7 +217,7 @@ def test_a_users_boom_is_read(edited):
             (BASE_INERTIA, "[[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]]"),
         )
     )
-    assert (boom.name, boom.gravity, boom.geometry.L1, boom.payload) == ("mine", 9.81, 1.0, 2.5)
+    assert (boom.name, boom.gravity, boom.geometry.L1, boom.payload.mass) == ("mine", 9.81, 1.0, 2.5)
     assert boom.limits.lower[4] == -np.pi / 4
     np.testing.assert_array_equal(boom.bodies["base"].inertia, [[2.0, 0.1, 0.2], [0.1, 3.0, 0.3], [0.2, 0.3, 4.0]])
     assert not boom.bodies["base"].inertia.flags.writeable

@@ -89,7 +89,7 @@ def test_mount_wrench_is_minus_what_a_free_root_needs(boom, oracle, tolerance, p
 def test_mount_carries_the_weight_at_rest(boom):
     rest = np.zeros(5)
     force = inverse_dynamics(boom, boom.pose("transport"), rest, rest).mount[:3]
-    weight = (boom.mass + boom.payload) * boom.gravity
+    weight = (boom.mass + boom.payload.mass) * boom.gravity
     np.testing.assert_allclose(force, [0.0, 0.0, -weight], rtol=1e-15, atol=0.0)
 
 
@@ -249,7 +249,9 @@ def assert_one_by_one(boom: Boom, batch: Loads, states: tuple[Array, ...], shape
         (3, lambda loads: loads.pins.frame_8),
     ):
         expected = np.reshape([part(loads) for loads in one_by_one], (*shape, last))
-        np.testing.assert_array_equal(part(batch), expected, strict=True)
+        assert part(batch).shape == expected.shape
+        scale = np.abs(expected).max(initial=1.0)  # a matrix product adds in another order in another batch
+        np.testing.assert_allclose(part(batch), expected, rtol=0, atol=2e-15 * scale)
 
 
 def test_states_broadcast(boom):
@@ -258,7 +260,7 @@ def test_states_broadcast(boom):
     assert loads.tau.shape == (3, 4, 5)
     assert loads.mount.shape == (3, 4, 6)
     assert loads.pins.frame_7.shape == (3, 4, 3)
-    np.testing.assert_array_equal(loads.tau[2, 3], inverse_dynamics(boom, q[0], qd[2], qdd[3]).tau)
+    np.testing.assert_allclose(loads.tau[2, 3], inverse_dynamics(boom, q[0], qd[2], qdd[3]).tau, rtol=0, atol=1e-12)
 
 
 def test_reactions_are_left_out_on_demand(boom):
@@ -266,7 +268,7 @@ def test_reactions_are_left_out_on_demand(boom):
     loads = inverse_dynamics(boom, *states, reactions=False)
     assert loads.pins is None
     assert loads.mount is None
-    np.testing.assert_array_equal(loads.tau, inverse_dynamics(boom, *states).tau)
+    np.testing.assert_allclose(loads.tau, inverse_dynamics(boom, *states).tau, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

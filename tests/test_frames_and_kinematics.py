@@ -73,10 +73,12 @@ def test_link_axes_point_along_the_links():
     q = positions(200, 6)
     zero = np.zeros(len(q))
     angles = {"base": zero, "inner": q[:, 1], "outer": q[:, 1], "end_effector": q[:, 2] + q[:, 4]}
+    angles["payload"] = angles["end_effector"]
     forward = np.stack([np.cos(q[:, 0]), np.sin(q[:, 0]), zero], axis=-1)
     right = np.stack([np.sin(q[:, 0]), -np.cos(q[:, 0]), zero], axis=-1)
     up = np.array([0.0, 0.0, 1.0])
     poses = body_transforms(BOOM, q)
+    poses["payload"] = poses.pop("tip")
     for name, R in R_LINK_BODY.items():
         angle = angles.get(name, q[:, 2])[:, None]
         axes = (np.cos(angle) * forward + np.sin(angle) * up, np.cos(angle) * up - np.sin(angle) * forward, right)

@@ -78,6 +78,15 @@ def test_between_two_reachable_stretches_the_nearer_one_counts(length, sense):
     assert found.distance < 0.25
 
 
+@pytest.mark.parametrize("rise", [0.1176, 0.1178, 0.118])
+def test_a_stretch_of_two_millimetres_is_found(rise):
+    """Some of the lines that meet the retracted actuator's reach at 1.1 m, for 2 to 4 mm."""
+    target = 1.2 * np.array([0.911, 0.389, rise])
+    found = nearest_reachable(BOOM, target, DOWN, ActuatorAngle(-0.5))
+    assert found.within_limits
+    assert 0.09 < found.distance < 0.1
+
+
 @HOLDS
 def test_distance_and_position_agree(hold):
     rng = np.random.default_rng(2)
