@@ -1,45 +1,91 @@
 """The boom itself: geometry, bodies, limits and drives, and its kinematics and dynamics. It knows nothing of time
 profiles, screens or files, its own TOML aside."""
 
-from boom_model.boom import JOINTS, Body, Boom, Geometry, Limits
+from boom_model.base_motion import BaseMotion, up_on_slope
+from boom_model.boom import JOINTS, Body, Boom, Friction, Geometry, Limits, Mount
 from boom_model.catalogue import Catalogue
 from boom_model.drives import Drive, Gearbox, Motor, Winding, Wiring
-from boom_model.dynamics import Loads, PinForces, inverse_dynamics
+from boom_model.dynamics import Loads, PinForces, inner_link_load, inverse_dynamics
+from boom_model.equations_of_motion import (
+    forward_dynamics,
+    gravity_torque,
+    kinetic_energy,
+    mass_matrix,
+    potential_energy,
+    velocity_torque,
+)
 from boom_model.errors import BoomError, InfeasibleError, InputError
 from boom_model.frames import body_transforms, dh_rows, frame_transforms
-from boom_model.inverse_kinematics import (
+from boom_model.holds import (
     ActuatorAngle,
     ActuatorHorizontal,
-    Branches,
+    ChoiceHold,
+    ConstraintHold,
     FixedExtension,
+    Hold,
+    LargestMargin,
+    LeastExtension,
+    LeastTorque,
+    NearestHorizontal,
+    NearestPose,
+)
+from boom_model.inverse_kinematics import (
+    Branches,
     Solution,
     Solutions,
     inverse_kinematics,
+    inverse_kinematics_of_pose,
     solve_branches,
 )
-from boom_model.kinematics import TipPose, forward_kinematics, jacobian
+from boom_model.kinematics import (
+    BodyMotion,
+    FrameMotion,
+    TipPose,
+    body_motion,
+    forward_kinematics,
+    frame_motion,
+    jacobian,
+    jacobian_rate,
+    manipulability,
+    transmission_angle,
+)
 from boom_model.provenance import Basis, Origin, Sourced
 from boom_model.reach import NearestReachable, nearest_reachable
+from boom_model.torque_breakdown import Breakdown, breakdown
 
 __all__ = [
     "JOINTS",
     "ActuatorAngle",
     "ActuatorHorizontal",
+    "BaseMotion",
     "Basis",
     "Body",
+    "BodyMotion",
     "Boom",
     "BoomError",
     "Branches",
+    "Breakdown",
     "Catalogue",
+    "ChoiceHold",
+    "ConstraintHold",
     "Drive",
     "FixedExtension",
+    "FrameMotion",
+    "Friction",
     "Gearbox",
     "Geometry",
+    "Hold",
     "InfeasibleError",
     "InputError",
+    "LargestMargin",
+    "LeastExtension",
+    "LeastTorque",
     "Limits",
     "Loads",
     "Motor",
+    "Mount",
+    "NearestHorizontal",
+    "NearestPose",
     "NearestReachable",
     "Origin",
     "PinForces",
@@ -49,13 +95,28 @@ __all__ = [
     "TipPose",
     "Winding",
     "Wiring",
+    "body_motion",
     "body_transforms",
+    "breakdown",
     "dh_rows",
+    "forward_dynamics",
     "forward_kinematics",
+    "frame_motion",
     "frame_transforms",
+    "gravity_torque",
+    "inner_link_load",
     "inverse_dynamics",
     "inverse_kinematics",
+    "inverse_kinematics_of_pose",
     "jacobian",
+    "jacobian_rate",
+    "kinetic_energy",
+    "manipulability",
+    "mass_matrix",
     "nearest_reachable",
+    "potential_energy",
     "solve_branches",
+    "transmission_angle",
+    "up_on_slope",
+    "velocity_torque",
 ]

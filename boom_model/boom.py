@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model.arrays import Array, checked, read_only, scalar
+from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.drives import Drive
 from boom_model.errors import InputError
-from boom_model.provenance import Origin
+from boom_model.provenance import Origin, Sourced
 
 JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
 """Joint names, in the order of q: theta1 .. theta5 of the thesis."""
@@ -83,7 +83,7 @@ class Limits:
         coupled = q[..., 1:2] + self.linkage - q[..., 2:3]
         return np.concatenate([np.maximum(self.lower - q, q - self.upper), coupled], axis=-1)
 
-    def hold(self, q: ArrayLike) -> Array:
+    def hold(self, q: ArrayLike) -> Mask:
         """Whether q (..., 5) is within every position limit, to LIMIT_TOLERANCE; bool of shape (...)."""
         return np.asarray((self.excess(q) <= LIMIT_TOLERANCE).all(axis=-1))
 
@@ -119,6 +119,16 @@ class Friction:
     """Of each joint's pair; None where none is given."""
 
 
+@dataclass(frozen=True)
+class Mount:
+    """What the vehicle's mount bears; None where nobody says."""
+
+    force: Sourced[float] | None
+    """Largest force [N]."""
+    moment: Sourced[float] | None
+    """Largest moment about the origin of frame 1 [Nm]."""
+
+
 @dataclass(frozen=True, eq=False)
 class Boom:
     """A five-joint boom on a parallelogram linkage."""
@@ -135,6 +145,7 @@ class Boom:
     poses: Mapping[str, Array]
     """Named joint positions, each (5,)."""
     friction: Friction
+    mount: Mount
     gravity: float = 9.81
     """[m/s^2]"""
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from boom_model.arrays import Array, checked, read_only
-from boom_model.boom import JOINTS, MOVING_BODIES, Body, Boom, Friction, Geometry, Limits
+from boom_model.boom import JOINTS, MOVING_BODIES, Body, Boom, Friction, Geometry, Limits, Mount
 from boom_model.catalogue import CATALOGUE_FILE, Catalogue
 from boom_model.drives import Drive, Wiring
 from boom_model.errors import InputError
@@ -162,6 +162,11 @@ class _LinkageTable(Table):
     transmission_warning_deg: _Sourced[NonNegative]
 
 
+class _MountTable(Table):
+    force_N: _Sourced[Positive] | None = None
+    moment_Nm: _Sourced[Positive] | None = None
+
+
 class _PayloadTable(_Origin):
     mass_kg: NonNegative
     com_m: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
@@ -184,6 +189,7 @@ class _BoomTable(Table):
     payload: _PayloadTable
     joints: _JointsTable
     linkage: _LinkageTable
+    mount: _MountTable = Field(default_factory=_MountTable)
     poses: dict[str, _PoseTable] = Field(default_factory=dict)
 
 
@@ -201,6 +207,7 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
         bodies=MappingProxyType({name: _body(getattr(table.bodies, name)) for name in ("base", *MOVING_BODIES)}),
         payload=_body(table.payload),
         friction=_friction(joints),
+        mount=Mount(_given(table.mount.force_N), _given(table.mount.moment_Nm)),
         limits=_limits(joints, table.linkage),
         drives=tuple(
             _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), known, catalogue)
@@ -212,6 +219,10 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
 
 def _body(table: _BodyTable | _PayloadTable) -> Body:
     return Body(table.mass_kg, read_only(table.com_m), table.inertia_kg_m2)
+
+
+def _given(table: "_Sourced[V] | None") -> Sourced[V] | None:
+    return None if table is None else table.sourced
 
 
 def _friction(joints: list[Any]) -> Friction:
@@ -258,9 +269,9 @@ def _drive(file: Path, key: str, table: _DriveTable | None, known: Catalogue, ca
     return Drive(
         motor=motor,
         gearbox=known.gearboxes[table.gearbox],
-        bus_voltage=None if voltage is None else voltage.sourced,
+        bus_voltage=_given(voltage),
         wiring=None if wiring is None else Sourced(Wiring(wiring.value), wiring.origin),
-        brake=None if table.brake is None else table.brake.sourced,
+        brake=_given(table.brake),
     )
 
 

@@ -31,7 +31,9 @@ from boom_model.frames import R_LINK_BODY
 
 PayloadAs = Literal["mass", "force"]
 
-_CHUNK = 2048  # samples at once: the working arrays of a chunk stay in the processor's cache
+_CHUNK = 1280
+"""Samples at once. The working arrays of a chunk stay in the processor's cache, and OpenBLAS takes its products on one thread:
+a second one gains nothing on so thin a matrix, and waits for its turn on a busy machine."""
 
 _O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
 _LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
@@ -111,19 +113,19 @@ def inverse_dynamics(
         np.empty((count, 6)) if reactions else None,
     )
     model = _model(boom, payload_as)
+    rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives])
     for start in range(0, count, _CHUNK):
         part = slice(start, start + _CHUNK)
         state = _State(*(np.ascontiguousarray(x[part].T) for x in motion))
         plane = _plane(boom, state, *(x[part].T for x in outside))
         applied = _Applied(*(None if x is None else _into_plane(state, x[part].T) for x in (push, twist)))
         _newton_euler(model, state, plane, applied, out.part(part))
-    tau = out.tau
-    if friction:
-        tau += boom.friction.viscous * motion[1] + boom.friction.coulomb * np.sign(motion[1])
-    if drive_inertia:
-        tau += np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) * motion[2]
+        if friction:
+            out.tau[part] += boom.friction.viscous * motion[1][part] + boom.friction.coulomb * np.sign(motion[1][part])
+        if drive_inertia:
+            out.tau[part] += rotors * motion[2][part]
     return Loads(
-        tau=tau.reshape(*shape, 5),
+        tau=out.tau.reshape(*shape, 5),
         pins=None if out.pins is None else PinForces(*(p.reshape(*shape, 3) for p in out.pins)),
         mount=None if out.mount is None else out.mount.reshape(*shape, 6),
     )
@@ -256,7 +258,7 @@ def _vectors(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 def _into_plane(state: _State, vector: Array) -> Array:
     """(3, n) along frame 1 to x, z and n of the plane."""
-    c, s = np.cos(state.q[0]), np.sin(state.q[0])
+    c, s = _cosine_and_sine(state.q[0])
     return np.stack([c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]])
 
 
@@ -277,15 +279,15 @@ def _plane(boom: Boom, state: _State, *base: Array) -> _Plane:
 
 
 def _accelerations(state: _State, plane: _Plane, C: Array, S: Array, rho: Array) -> Array:
-    """A, the acceleration of each vector b: (11, 3, n) along x, z and n. C, S (3, n): cosine and sine of theta2, 3, t."""
-    A = np.zeros((11, 3, C.shape[1]))
+    """A, the acceleration of each vector b: (3, 11, n) along x, z and n. C, S (3, n): cosine and sine of theta2, 3, t."""
+    A = np.empty((3, 11, C.shape[1]))
     w1, w2, w3 = plane.W
     d1, d2, d3 = plane.W1
     w11, w22, w33, w12, w13, w23 = w1 * w1, w2 * w2, w3 * w3, w1 * w2, w1 * w3, w2 * w3
-    A[_O] = np.stack(np.broadcast_arrays(*plane.a, C[0])[:3])
-    A[_X, 0], A[_X, 1], A[_X, 2] = -(w22 + w33), w12 + d3, w13 - d2
-    A[_Z, 0], A[_Z, 1], A[_Z, 2] = w12 - d3, -(w11 + w33), w23 + d1
-    A[_N, 0], A[_N, 1], A[_N, 2] = w13 + d2, w23 - d1, -(w11 + w22)
+    A[0, _O], A[1, _O], A[2, _O] = plane.a
+    A[0, _X], A[1, _X], A[2, _X] = -(w22 + w33), w12 + d3, w13 - d2
+    A[0, _Z], A[1, _Z], A[2, _Z] = w12 - d3, -(w11 + w33), w23 + d1
+    A[0, _N], A[1, _N], A[2, _N] = w13 + d2, w23 - d1, -(w11 + w22)
     qd, qdd = state.qd, state.qdd
     rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
     for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
@@ -294,18 +296,18 @@ def _accelerations(state: _State, plane: _Plane, C: Array, S: Array, rho: Array)
         along_x, along_z = square + w22, square + w11
         less, more = accel + d3 - w12, accel + d3 + w12
         k, m = double * w1 + w13 - d2, double * w2 + w23 + d1
-        A[e, 0] = -along_x * c - less * s
-        A[e, 1] = more * c - along_z * s
-        A[e, 2] = k * c + m * s
-        A[p, 0] = along_x * s - less * c
-        A[p, 1] = -more * s - along_z * c
-        A[p, 2] = m * c - k * s
+        A[0, e] = -along_x * c - less * s
+        A[1, e] = more * c - along_z * s
+        A[2, e] = k * c + m * s
+        A[0, p] = along_x * s - less * c
+        A[1, p] = -more * s - along_z * c
+        A[2, p] = m * c - k * s
     c, s, slide = C[1], S[1], 2.0 * qd[3]
     turning = slide * (qd[2] + w3)
-    A[_RHO] = rho * A[_E3]
-    A[_RHO, 0] += qdd[3] * c - turning * s
-    A[_RHO, 1] += qdd[3] * s + turning * c
-    A[_RHO, 2] += slide * (w1 * s - w2 * c)
+    A[:, _RHO] = rho * A[:, _E3]
+    A[0, _RHO] += qdd[3] * c - turning * s
+    A[1, _RHO] += qdd[3] * s + turning * c
+    A[2, _RHO] += slide * (w1 * s - w2 * c)
     return A
 
 
@@ -313,11 +315,10 @@ def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied
     """Fills the outputs of a chunk."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
-    angles = np.stack([q[1], q[2], q[2] + q[4]])
-    C, S = np.cos(angles), np.sin(angles)
+    C, S = _cosine_and_sine(np.stack([q[1], q[2], q[2] + q[4]]))
     A = _accelerations(state, plane, C, S, rho)
     rows = model.rows if out.pins is not None else model.rows[:11]
-    U = (rows @ A.reshape(11, -1)).reshape(len(rows), 3, -1)
+    U = rows @ A
     if model.hanging:
         weight = [np.broadcast_to(-model.hanging * np.asarray(x), rho.shape) for x in plane.lift]
         _put_on(U, model.payload, np.stack(weight))
@@ -331,23 +332,23 @@ def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied
         turned: Array = c * (e[1] - p[0]) - s * (e[0] + p[1])
         return turned
 
-    on_tool = about(ct, st, U[_ET], U[_PT]) - moment[2]
-    beyond_actuator = rho * (c3 * U[_RHO, 1] - s3 * U[_RHO, 0]) + on_tool
+    on_tool = about(ct, st, U[:, _ET], U[:, _PT]) - moment[2]
+    beyond_actuator = rho * (c3 * U[1, _RHO] - s3 * U[0, _RHO]) + on_tool
     # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
     reach = ((c2, _E2, -s2, _P2), (c3, _E3, -s3, _P3), (rho * c3, _RHO, 0.0, _O), (ct, _ET, -st, _PT))
-    out.tau[:, 0] = U[_N, 0] - U[_X, 2] - sum(a * U[i, 2] + b * U[j, 2] for a, i, b, j in reach) - moment[1]
-    out.tau[:, 1] = about(c2, s2, U[_E2], U[_P2])
-    out.tau[:, 2] = about(c3, s3, U[_E3], U[_P3]) + beyond_actuator
-    out.tau[:, 3] = c3 * U[_RHO, 0] + s3 * U[_RHO, 1]
+    out.tau[:, 0] = U[0, _N] - U[2, _X] - sum(a * U[2, i] + b * U[2, j] for a, i, b, j in reach) - moment[1]
+    out.tau[:, 1] = about(c2, s2, U[:, _E2], U[:, _P2])
+    out.tau[:, 2] = about(c3, s3, U[:, _E3], U[:, _P3]) + beyond_actuator
+    out.tau[:, 3] = c3 * U[0, _RHO] + s3 * U[1, _RHO]
     out.tau[:, 4] = on_tool
     if out.pins is None or out.mount is None:
         return
 
     # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from pin 6: the moments about
     # pins 8 and 6 give the force at pin 7 across both directions, and the balance of forces the other two.
-    F_outer, F_top = U[11], U[14]
-    M_outer = about(c2, s2, U[12], U[13])
-    M_top = about(c3, s3, U[15], U[16]) + beyond_actuator
+    F_outer, F_top = U[:, 11], U[:, 14]
+    M_outer = about(c2, s2, U[:, 12], U[:, 13])
+    M_top = about(c3, s3, U[:, 15], U[:, 16]) + beyond_actuator
     sine = s3 * c2 - c3 * s2
     with np.errstate(divide="ignore", invalid="ignore"):
         along_inner, along_lower = -M_top / (g.L5 * sine), -M_outer / (g.L4 * sine)
@@ -356,18 +357,25 @@ def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied
         out.pins[pin, :, 0], out.pins[pin, :, 2] = force
 
     rise = ((s2, _E2, c2, _P2), (s3, _E3, c3, _P3), (rho * s3, _RHO, 0.0, _O), (st, _ET, ct, _PT))
-    Mx = U[_Z, 2] - U[_N, 1] + sum(a * U[i, 2] + b * U[j, 2] for a, i, b, j in rise) - moment[0]
-    Mn = U[_X, 1] - U[_Z, 0] + out.tau[:, 1] + out.tau[:, 2]
-    c1, s1 = np.cos(q[0]), np.sin(q[0])
-    for row, (along, normal) in ((0, (U[_O, 0], U[_O, 2])), (3, (Mx, Mn))):
+    Mx = U[2, _Z] - U[1, _N] + sum(a * U[2, i] + b * U[2, j] for a, i, b, j in rise) - moment[0]
+    Mn = U[1, _X] - U[0, _Z] + out.tau[:, 1] + out.tau[:, 2]
+    c1, s1 = _cosine_and_sine(q[0])
+    for row, (along, normal) in ((0, (U[0, _O], U[2, _O])), (3, (Mx, Mn))):
         out.mount[:, row] = -(c1 * along + s1 * normal)
         out.mount[:, row + 1] = -(s1 * along - c1 * normal)
-    out.mount[:, 2] = -U[_O, 1]
+    out.mount[:, 2] = -U[1, _O]
     out.mount[:, 5] = -out.tau[:, 0]
+
+
+def _cosine_and_sine(angle: Array) -> tuple[Array, Array]:
+    """By the tangent of half the angle, to 3e-16: NumPy's tangent is vectorised for doubles, its cosine and sine are not."""
+    t = np.tan(0.5 * angle)
+    u = 2.0 / (1.0 + t * t)
+    return u - 1.0, u * t
 
 
 def _put_on(U: Array, g: Array, force: Array) -> None:
     """Takes a force (3, n) at the point g off what the bodies need, in place."""
-    U[:11] -= g[:, None, None] * force
-    if len(U) > 11:
-        U[14:] -= g[[_O, _E3, _P3], None, None] * force
+    U[:, :11] -= g[:, None] * force[:, None]
+    if U.shape[1] > 11:
+        U[:, 14:] -= g[[_O, _E3, _P3], None] * force[:, None]

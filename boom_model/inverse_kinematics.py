@@ -1,15 +1,4 @@
-"""Inverse kinematics in closed form: a tip position, a pitch and a hold give every branch.
-
-A position and a pitch fix four of the five joints; the hold is the extra constraint. With phi = pitch - 90 deg, and
-r = +-hypot(x, y) (the minus sign is the branch with the base turned round), the inner link must close the vector
-
-    L9 e(theta2) = (F + rho c3 - L6 s3,  G + rho s3 + L6 c3),   F = r - L2 - L8 cos(pitch),   G = z - L1 - L8 sin(pitch)
-
-whose length is L9 (thesis, eqs. 2.20-2.38 with their corrections; H = L9^2 - F^2 - G^2 - L6^2):
-
-    actuator's angle held:   rho^2 + b rho + c = 0,   b = 2 (F c3 + G s3),  c = 2 L6 (G c3 - F s3) - H
-    extension held:          e cos(theta3) + d sin(theta3) = H - rho^2,   d = 2 (rho G - F L6),  e = 2 (rho F + G L6)
-"""
+"""Inverse kinematics in closed form: a tip position, a pitch and a hold give every branch."""
 
 from dataclasses import dataclass
 
@@ -17,57 +6,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
-from boom_model.boom import IS_LENGTH, LIMIT_TOLERANCE, Boom
-from boom_model.errors import InputError
+from boom_model.boom import Boom
+from boom_model.closure import closed_by_angle, closed_by_extension, turned_into_limits
+from boom_model.errors import InfeasibleError, InputError
+from boom_model.families import Targets, best_member
+from boom_model.holds import ActuatorHorizontal, ChoiceHold, ConstraintHold, FixedExtension, Hold, LargestMargin, NearestPose
 
-_TANGENT = 1e-13  # relative gap of a closure that is rounding: the target is on the boundary of the reach
-
-
-@dataclass(frozen=True)
-class ActuatorAngle:
-    """The actuator is held at an elevation above the boom's forward horizontal: theta3 = pi + elevation."""
-
-    elevation: float
-    """[rad]; negative points down."""
-
-    def __str__(self) -> str:
-        return f"actuator={np.degrees(self.elevation):.6g} deg"
-
-
-@dataclass(frozen=True)
-class ActuatorHorizontal(ActuatorAngle):
-    """The actuator is held horizontal, pointing away from the base: theta3 = pi."""
-
-    elevation: float = 0.0
-
-    def __str__(self) -> str:
-        return "horizontal"
-
-
-@dataclass(frozen=True)
-class FixedExtension:
-    """The actuator's extension is held: theta4 = extension."""
-
-    extension: float
-    """[m]"""
-
-    def __str__(self) -> str:
-        return f"extension={self.extension:.6g} m"
-
-
-Hold = ActuatorAngle | FixedExtension
+_PITCHES = 360
+_REFINEMENTS = 40
+_SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
+_CHUNK = 20_000  # targets at once under a choice hold, whose scan takes some 10 kB a target
 
 
 @dataclass(frozen=True, eq=False)
 class Branches:
-    """Every branch for a batch of targets: two of the base times two of the closure, in the last branch axis."""
+    """Every branch for a batch of targets, in the last branch axis.
+
+    A constraint hold has four: two of the base times two of the closure. A choice hold has two, of the base: the best joint
+    position within the limits on either side.
+    """
 
     q: Array
-    """(..., 4, 5); NaN where the branch does not exist. Yaw, lower and wrist are wrapped into their limits if they can be."""
+    """(..., 4 or 2, 5); NaN where the branch does not exist. Yaw, lower and wrist are wrapped into their limits if they can."""
     exists: Mask
-    """(..., 4) bool. A double root, and the second base branch of a target on the yaw axis, count once."""
+    """(..., 4 or 2). A double root, and the second base branch of a target on the yaw axis, count once."""
     within_limits: Mask
-    """(..., 4) bool"""
+    """(..., 4 or 2)"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,13 +51,15 @@ class Solutions:
 
     solutions: tuple[Solution, ...]
     best: int | None
-    """Index of the branch within the limits that is nearest to the reference; None where there is none."""
+    """Index of the branch within the limits that is nearest to the reference, or has the least cost; None without one."""
+    pitch: float
+    """[rad]; the one chosen where it was left free."""
 
 
 def inverse_kinematics(
     boom: Boom,
     position: ArrayLike,
-    pitch: float = -np.pi / 2.0,
+    pitch: float | None = -np.pi / 2.0,
     hold: Hold | None = None,
     reference: ArrayLike | None = None,
 ) -> Solutions:
@@ -101,10 +67,11 @@ def inverse_kinematics(
 
     Args:
         position: (3,) of the tip in frame 1 [m].
-        pitch: elevation of the end effector above the boom's own forward horizontal [rad]; -pi/2 faces down.
-        hold: the extra constraint; None holds the actuator horizontal.
+        pitch: elevation of the end effector above the boom's own forward horizontal [rad]; -pi/2 faces down. None leaves it
+            free: the hold chooses the one with its least cost, a constraint hold the one with the largest margin to the limits.
+        hold: the extra constraint, or the choice; None holds the actuator horizontal.
         reference: (5,) joint position that the best branch is nearest to, the distance of each joint measured as a share of
-            its range; None is the middle of the ranges.
+            its range; None is the middle of the ranges. A choice hold has its own measure, its cost.
 
     Raises:
         InputError: an input is not finite or of the wrong shape. An unreachable target is no error: no solutions.
@@ -113,7 +80,8 @@ def inverse_kinematics(
     position = checked("position", position)
     if position.shape != (3,):
         raise InputError(f"position has shape {position.shape}; it must be (3,)")
-    found = solve_branches(boom, position, scalar("pitch", pitch), hold)
+    pitch = _free_pitch(boom, position, hold) if pitch is None else scalar("pitch", pitch)
+    found = solve_branches(boom, position, pitch, hold)
     free = float(np.hypot(position[0], position[1])) == 0.0
     note = ("the target is on the yaw axis: yaw is free, 0 is chosen",) if free else ()
     solutions = tuple(
@@ -121,7 +89,72 @@ def inverse_kinematics(
         for q, exists, within in zip(found.q, found.exists, found.within_limits, strict=True)
         if exists
     )
-    return Solutions(solutions, _best(boom, solutions, reference))
+    return Solutions(solutions, _best(boom, solutions, hold, reference), pitch)
+
+
+def inverse_kinematics_of_pose(
+    boom: Boom, T: ArrayLike, hold: Hold | None = None, reference: ArrayLike | None = None, tolerance: float = 1e-6
+) -> Solutions:
+    """Every branch that puts frame 11 at a homogeneous transform T_1_11 (4, 4) (thesis, eq. 2.17), under a hold.
+
+    Five joints cannot have every orientation: the wrist's axis z stays horizontal, and the tip in the arm's plane across it.
+
+    Args:
+        tolerance: [rad, m] by which T may miss what the arm can have.
+
+    Raises:
+        InputError: T is not finite, not (4, 4), or no rigid transform.
+        InfeasibleError: the arm cannot have this orientation, or not at this place; says why and by how much.
+    """
+    T = checked("T", T, 4)
+    if T.shape != (4, 4):
+        raise InputError(f"T has shape {T.shape}; it must be (4, 4)")
+    R, position = T[:3, :3], T[:3, 3]
+    if not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0.0 or not np.allclose(T[3], [0, 0, 0, 1]):
+        raise InputError("T is no rigid transform: a rotation, a place and a last row of 0 0 0 1")
+    if abs(R[2, 2]) > tolerance:
+        tilt = np.degrees(np.arcsin(np.clip(abs(R[2, 2]), 0.0, 1.0)))
+        raise InfeasibleError(
+            f"the boom cannot have this orientation: z of its tip stays horizontal, here it tilts by {tilt:.4g} deg"
+        )
+    yaw = np.arctan2(R[0, 2], -R[1, 2])
+    beside = float(position[0] * np.sin(yaw) - position[1] * np.cos(yaw))
+    if abs(beside) > tolerance:
+        raise InfeasibleError(
+            f"the boom cannot have this orientation there: its plane at yaw {np.degrees(yaw):.4g} deg passes the tip "
+            f"by {abs(beside):.4g} m"
+        )
+    pitch = float(np.arctan2(R[2, 0], R[0, 0] * np.cos(yaw) + R[1, 0] * np.sin(yaw)))
+    hold = ActuatorHorizontal() if hold is None else hold
+    every = inverse_kinematics(boom, position, pitch, hold, reference).solutions
+    facing = tuple(s for s in every if np.cos(s.q[0] - yaw) > 0.0)  # the base turned round faces the other way
+    return Solutions(facing, _best(boom, facing, hold, reference), pitch)
+
+
+def _free_pitch(boom: Boom, position: Array, hold: Hold) -> float:
+    """The pitch with the least cost, by a scan of the whole turn and golden section; straight down where none is reachable."""
+    measure = LargestMargin() if isinstance(hold, ConstraintHold) else hold
+
+    def cost(pitch: Array) -> Array:
+        found = solve_branches(boom, position, pitch, hold)
+        values = np.full(found.within_limits.shape, np.inf)
+        values[found.within_limits] = measure.cost(boom, found.q[found.within_limits])
+        least: Array = values.min(axis=-1)
+        return least
+
+    turn = np.linspace(-np.pi, np.pi, _PITCHES + 1)
+    costs = cost(turn)
+    best = int(np.argmin(costs))
+    if not np.isfinite(costs[best]):
+        return -np.pi / 2.0
+    step, middle = turn[1] - turn[0], float(turn[best])
+    a, b = middle - step, middle + step
+    for _ in range(_REFINEMENTS):
+        c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
+        left, right = cost(np.array([c, d]))
+        a, b = (a, d) if left <= right else (c, b)
+    refined = (a + b) / 2.0
+    return refined if cost(np.array([refined]))[0] <= costs[best] else middle
 
 
 def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, hold: Hold) -> Branches:
@@ -130,77 +163,67 @@ def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, hold: Hold
     Args:
         position: (..., 3) of the tip in frame 1 [m].
         pitch: (...) [rad].
-        hold: the extra constraint.
+        hold: the extra constraint, or the choice among all joint positions within the limits.
 
     Raises:
         InputError: an input is not finite or of the wrong shape.
     """
-    if not isinstance(hold, ActuatorAngle | FixedExtension):
+    if not isinstance(hold, Hold):
         raise InputError(f"hold is {hold!r}; it must be one of the holds of boom_model")
     position, pitch = checked("position", position, 3) + 0.0, checked("pitch", pitch)  # + 0.0 takes the sign off a zero
     try:
         x, y, z, pitch = np.broadcast_arrays(*np.moveaxis(position, -1, 0), pitch)
     except ValueError:
         raise InputError(f"shapes do not match: position {position.shape}, pitch {pitch.shape}") from None
-    g = boom.geometry
-    side = np.array([1.0, 1.0, -1.0, -1.0])  # of the base
-    root = np.array([1.0, -1.0, 1.0, -1.0])  # of the closure
-    radius = np.hypot(x, y)[..., None]
-    F = side * radius - g.L2 - g.L8 * np.cos(pitch)[..., None]
-    G = np.broadcast_to((z - g.L1 - g.L8 * np.sin(pitch))[..., None], F.shape)
-
-    with np.errstate(over="ignore", invalid="ignore"):  # an absurdly far target is out of reach, not an error
-        theta3, rho, exists = _closure(boom, hold, F, G, root)
-        exists = exists & np.isfinite(rho) & ((side > 0.0) | (radius > 0.0))
-        c3, s3 = np.cos(theta3), np.sin(theta3)
-        theta2 = np.arctan2(G + rho * s3 + g.L6 * c3, F + rho * c3 - g.L6 * s3)
-    theta1 = np.arctan2(y, x)[..., None] + np.where(side < 0, np.pi, 0.0)
-    theta5 = (pitch - np.pi / 2.0)[..., None] - theta3
-    q = np.stack(np.broadcast_arrays(theta1, theta2, theta3, rho - g.L7, theta5), axis=-1)
-    q[~exists] = np.nan
-    q = _wrapped(boom, q)
+    side = np.array([1.0, -1.0])
+    g, radius = boom.geometry, np.hypot(x, y)[..., None]
+    targets = Targets(
+        theta1=np.arctan2(y, x)[..., None] + np.where(side < 0.0, np.pi, 0.0),
+        F=side * radius - g.L2 - g.L8 * np.cos(pitch)[..., None],
+        G=np.repeat((z - g.L1 - g.L8 * np.sin(pitch))[..., None], 2, axis=-1),
+        phi=np.repeat((pitch - np.pi / 2.0)[..., None], 2, axis=-1),
+    )
+    distinct = (side > 0.0) | (radius > 0.0)
+    if isinstance(hold, ConstraintHold):
+        q, exists = _constrained(boom, targets, hold, distinct)
+    else:
+        q, exists = _chosen(boom, targets, hold, distinct)
     return Branches(q, exists, exists & boom.limits.hold(q))
 
 
-def _closure(boom: Boom, hold: Hold, F: Array, G: Array, root: Array) -> tuple[Array, Array, Mask]:
-    """theta3, rho, and whether the branch exists, each of F's shape."""
-    g = boom.geometry
+def _constrained(boom: Boom, targets: Targets, hold: ConstraintHold, distinct: Mask) -> tuple[Array, Mask]:
+    """q (..., 4, 5) and existence (..., 4) for targets (..., 2): both roots of either side."""
+    theta1, F, G, phi = (np.repeat(x, 2, axis=-1) for x in targets)
+    root = np.array([1.0, -1.0, 1.0, -1.0])
     if isinstance(hold, FixedExtension):
-        H = g.L9**2 - F**2 - G**2 - g.L6**2
-        rho = np.full_like(F, g.L7 + scalar("extension", hold.extension))
-        d, e, f = 2.0 * (rho * G - F * g.L6), 2.0 * (rho * F + G * g.L6), H - rho**2
-        amplitude = np.hypot(d, e)
-        room, scale = amplitude - np.abs(f), g.L9**2 + F**2 + G**2 + g.L6**2 + rho**2
-        ratio = np.divide(f, amplitude, out=np.zeros_like(f), where=amplitude > 0.0)
-        theta3 = np.arctan2(d, e) + root * np.arccos(np.clip(ratio, -1.0, 1.0))
-        exists = (room >= -_TANGENT * scale) & (amplitude > 0.0)
+        rho = np.full_like(F, boom.geometry.L7 + scalar("extension", hold.extension))
+        closure = closed_by_extension(boom, rho, F, G, root)
     else:
-        theta3 = np.full_like(F, np.pi + scalar("elevation", hold.elevation))
-        c3, s3 = np.cos(theta3), np.sin(theta3)
-        half_b, scale = F * c3 + G * s3, np.full_like(F, g.L9**2)
-        room = g.L9**2 - (G * c3 - F * s3 + g.L6) ** 2  # half_b^2 - c, without the squares that cancel in it
-        rho = -half_b + root * np.sqrt(np.maximum(room, 0.0))
-        exists = room >= -_TANGENT * scale
-    double = room <= _TANGENT * scale
-    return theta3, rho, exists & np.isfinite(room) & ~(double & (root < 0.0))
+        closure = closed_by_angle(boom, np.full_like(F, np.pi + scalar("elevation", hold.elevation)), F, G, root)
+    exists = closure.exists & np.repeat(distinct, 2, axis=-1)
+    extension = closure.rho - boom.geometry.L7
+    q = np.stack([theta1, closure.theta2, closure.theta3, extension, phi - closure.theta3], axis=-1)
+    q[~exists] = np.nan
+    return turned_into_limits(boom, q), exists
 
 
-def _wrapped(boom: Boom, q: Array) -> Array:
-    """Angles turned by whole turns into their limits, or else to the nearer side of them; above them on a tie."""
-    limits, turn = boom.limits, 2.0 * np.pi
-    above = np.mod(q - limits.lower, turn)
-    above = limits.lower + np.where(turn - above <= LIMIT_TOLERANCE, above - turn, above)
-    below = above - turn
-    nearer_below = limits.lower - below < above - limits.upper - LIMIT_TOLERANCE
-    return np.where(IS_LENGTH, q, np.where(nearer_below, below, above))
+def _chosen(boom: Boom, targets: Targets, hold: ChoiceHold, distinct: Mask) -> tuple[Array, Mask]:
+    """q (..., 2, 5) and existence (..., 2) for targets (..., 2)."""
+    shape = targets.F.shape
+    flat = Targets(*(np.reshape(x, -1) for x in targets))
+    q, exists = np.empty((flat.F.size, 5)), np.empty(flat.F.size, dtype=bool)
+    for start in range(0, flat.F.size, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        q[part], exists[part] = best_member(boom, Targets(*(x[part] for x in flat)), hold)
+    exists &= np.broadcast_to(distinct, shape).reshape(-1)
+    q[~exists] = np.nan
+    return q.reshape(*shape, 5), exists.reshape(shape)
 
 
-def _best(boom: Boom, solutions: tuple[Solution, ...], reference: ArrayLike | None) -> int | None:
-    limits = boom.limits
-    middle = (limits.lower + limits.upper) / 2.0
-    target = middle if reference is None else checked("reference", reference, 5)
-    if target.shape != (5,):
-        raise InputError(f"reference has shape {target.shape}; it must be (5,)")
-    span = np.where(limits.upper > limits.lower, limits.upper - limits.lower, 1.0)
+def _best(boom: Boom, solutions: tuple[Solution, ...], hold: Hold, reference: ArrayLike | None) -> int | None:
+    if isinstance(hold, ConstraintHold):
+        measure: ChoiceHold = NearestPose.to((boom.limits.lower + boom.limits.upper) / 2.0 if reference is None else reference)
+    else:
+        measure = hold
     allowed = [i for i, s in enumerate(solutions) if s.within_limits]
-    return min(allowed, key=lambda i: float(np.linalg.norm((solutions[i].q - target) / span)), default=None)
+    return min(allowed, key=lambda i: float(measure.cost(boom, solutions[i].q)), default=None)

@@ -10,7 +10,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from boom_model import JOINTS, Basis, Boom, Drive, Loads, Origin, inverse_dynamics
+from boom_model import JOINTS, BaseMotion, Basis, Boom, Drive, Loads, Origin, inverse_dynamics, transmission_angle
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, LIMIT_TOLERANCE
 from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque, speed_for_torque
@@ -25,6 +25,9 @@ ESTIMATE_WARNING = 0.25
 
 LOW_SPEED = 2.0 * np.pi
 """Motor speed [rad/s] (60 rpm) up to which a sheet's running torque holds whatever the supply; our own choice."""
+
+ANGLE_CHECKS = ("position", "lower - inner", "transmission angle")
+"""Checks whose margin is a distance to the bound."""
 
 _PROCEDURE = "Harmonic Drive's procedure, applied to another maker's gearbox"
 
@@ -59,22 +62,34 @@ class Row:
     source: str
 
 
-def check_rows(boom: Boom, trajectory: Trajectory, loads: Loads, payload_as: PayloadAs = "mass") -> tuple[Row, ...]:
-    """Every check of a motion: positions, speeds, accelerations and jerk, then each joint's drive.
+def check_rows(
+    boom: Boom,
+    trajectory: Trajectory,
+    loads: Loads,
+    *,
+    base: BaseMotion | None = None,
+    payload_as: PayloadAs = "mass",
+    shock: bool = False,
+) -> tuple[Row, ...]:
+    """Every check of a motion: positions, speeds, accelerations and jerk, then each joint's drive, then the mount.
 
     Args:
-        loads: the motion's own, from `inverse_dynamics`.
+        loads: the motion's own, from `inverse_dynamics`, with its reactions.
+        base: how the vehicle moves the base; the static torques take its tilt.
         payload_as: how the loads took the payload; the static torques take it alike.
+        shock: whether the vehicle's motion has a shock, which the gearbox may meet up to its momentary peak torque.
     """
     still = np.zeros_like(trajectory.q)
-    static = inverse_dynamics(boom, trajectory.q, still, still, payload_as=payload_as, reactions=False).tau
+    tilt = None if base is None else BaseMotion.of(up=base.up)
+    static = inverse_dynamics(boom, trajectory.q, still, still, base=tilt, payload_as=payload_as, reactions=False).tau
     rows: list[Row] = []
     for i in range(5):
         rows += _position_rows(boom, trajectory, i)
         rows += _rate_rows(boom, trajectory, i)
     for i, drive in enumerate(boom.drives):
         view = _JointView(JOINTS[i], IS_LENGTH[i], trajectory, loads.tau[:, i], static[:, i], i)
-        rows += _undriven_rows(view) if drive is None else _driven_rows(view, drive)
+        rows += _undriven_rows(view) if drive is None else _driven_rows(view, drive, shock)
+    rows += _mount_rows(boom, trajectory.t, loads)
     return tuple(rows)
 
 
@@ -151,6 +166,12 @@ def _position_rows(boom: Boom, trajectory: Trajectory, i: int) -> Iterator[Row]:
             trajectory.t[at],
             limits.origins["linkage"][0],
         )
+        angle = transmission_angle(trajectory.q)
+        at, origin = int(np.argmin(angle)), limits.origins["transmission"][0]
+        room = float(angle[at] - limits.transmission)
+        facts = (float(angle[at]), limits.transmission, unit, room, 0.0, float(trajectory.t[at]))
+        verdict = Verdict.PASS if room >= 0.0 else Verdict.WARN  # near the flat parallelogram the pins' forces grow
+        yield Row("lower", "transmission angle", *facts, verdict, origin.basis, origin.source)
 
 
 def _room(joint: str, check: str, demand: float, limit: float, room: float, unit: str, at: float, origin: Origin) -> Row:
@@ -197,15 +218,19 @@ def _undriven_rows(view: _JointView) -> Iterator[Row]:
     yield _held(view.joint, f"drive RMS {force}", rms, None, torque, None, origin)
 
 
-def _driven_rows(view: _JointView, drive: Drive) -> Iterator[Row]:
-    yield from _gearbox_rows(view, drive)
+def _driven_rows(view: _JointView, drive: Drive, shock: bool) -> Iterator[Row]:
+    yield from _gearbox_rows(view, drive, shock)
     yield from _motor_rows(view, drive)
+    yield _power_off_row(view, drive)
 
 
-def _gearbox_rows(view: _JointView, drive: Drive) -> Iterator[Row]:
+def _gearbox_rows(view: _JointView, drive: Drive, shock: bool) -> Iterator[Row]:
     gear, t = drive.gearbox, view.trajectory.t
     printed = Origin(Basis.PRINTED, f"{gear.source}; {_PROCEDURE}")
     at = int(np.argmax(np.abs(view.tau)))
+    if shock:
+        peak = float(abs(view.tau[at]))
+        yield _held(view.joint, "gearbox momentary peak", peak, gear.peak_torque, "Nm", float(t[at]), printed)
     yield _held(
         view.joint,
         "gearbox repeated peak",
@@ -236,6 +261,32 @@ def _gearbox_rows(view: _JointView, drive: Drive) -> Iterator[Row]:
         float(t[at]),
         Origin(Basis.PRINTED, gear.source + missing),
     )
+
+
+def _power_off_row(view: _JointView, drive: Drive) -> Row:
+    """Backdriving starts somewhere about the printed torque, which is no holding margin: only a brake holds."""
+    at = int(np.argmax(np.abs(view.static)))
+    demand, limit = float(abs(view.static[at])), drive.gearbox.backdrive_torque
+    facts = (view.joint, "power-off hold", demand, limit, "Nm", None, 0.0, float(view.trajectory.t[at]))
+    brake, sheet = drive.brake, drive.gearbox.source
+    if brake is not None and brake.value:
+        verdict = Verdict.WARN if brake.origin.basis is not Basis.PRINTED else Verdict.PASS
+        return Row(
+            *facts, verdict, brake.origin.basis, f"held by a brake: {brake.origin.source}; backdriven otherwise, {sheet}"
+        )
+    return Row(*facts, Verdict.FAIL, Basis.PRINTED, f"no brake is declared, and the gearbox is backdriven: {sheet}")
+
+
+def _mount_rows(boom: Boom, t: Array, loads: Loads) -> Iterator[Row]:
+    if loads.mount is None:
+        return
+    parts = (("force", "N", loads.mount[:, :3], boom.mount.force), ("moment", "Nm", loads.mount[:, 3:], boom.mount.moment))
+    for name, unit, vectors, bearable in parts:
+        size = np.linalg.norm(vectors, axis=-1)
+        at = int(np.argmax(size))
+        origin = Origin(Basis.PRINTED, "no limit of the vehicle's mount is given") if bearable is None else bearable.origin
+        limit = None if bearable is None else bearable.value
+        yield _held("mount", f"peak {name}", float(size[at]), limit, unit, float(t[at]), origin)
 
 
 def _motor_rows(view: _JointView, drive: Drive) -> Iterator[Row]:

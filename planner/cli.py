@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from boom_model import Boom, BoomError, InfeasibleError, inverse_kinematics
-from planner.targets import HOLDS, parse_hold, parse_pitch, parse_target, unreachable
+from boom_model import Boom, BoomError, InfeasibleError, InputError, inverse_kinematics
+from planner.targets import HOLDS, parse_along, parse_hold, parse_pitch, parse_target, unreachable
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -27,12 +27,17 @@ payload_as_option = click.option(
     help="Accelerate the payload with the tip, or hang its weight there and leave out its inertia, as the thesis does.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
+vehicle_option = click.option(
+    "--vehicle",
+    metavar="CASE",
+    help="What the vehicle does meanwhile: slope, track, shock, ditch or a FILE.toml; else it rests.",
+)
 pitch_option = click.option(
     "--pitch",
     default="down",
     show_default=True,
-    metavar="down|level|up|DEG",
-    help="Elevation of the end effector at a tip target.",
+    metavar="down|level|up|free|DEG",
+    help="Elevation of the end effector at a tip target; free lets the hold choose it.",
 )
 hold_option = click.option(
     "--hold",
@@ -77,24 +82,33 @@ def cli() -> None:
     "--profile", type=click.Choice(["cubic", "time-optimal", "jerk-limited"]), default="cubic", show_default=True,
     help="How the path is timed.",
 )  # fmt: skip
+@click.option("--via", multiple=True, metavar="TARGET", help="A target on the way, with a stop; may be given again.")
+@click.option(
+    "--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z",
+    help="What goes straight: the joints, or the tip from tip target to tip target; or an arc of the tip through a point.",
+)  # fmt: skip
 @click.option("--duration", type=float, metavar="S", help="Else the least that the limits allow.")
 @pitch_option
 @hold_option
 @payload_option
 @click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
 @click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
+@vehicle_option
 @boom_option
 @json_option
 def plan(
     start: str,
     goal: str,
     profile: str,
+    via: tuple[str, ...],
+    along: str,
     duration: float | None,
     pitch: str,
     hold: str,
     payload: float | None,
     out: str,
     csv_file: str | None,
+    vehicle: str | None,
     boom_file: str | None,
     as_json: bool,
 ) -> int:
@@ -107,11 +121,14 @@ def plan(
     Examples:
       boom plan transport phenotyping
       boom plan transport tip=1.4,0,1.0 --hold extension=0.25 --profile time-optimal
+      boom plan tip=1,1.7,0.9 tip=-1,1.7,0.9 --along line --profile jerk-limited
     """
     from planner.planning import plan as plan_move
     from planner.trajectory import write_csv
+    from planner.vehicle import load_case
 
     boom = _load(boom_file, payload)
+    case = None if vehicle is None else load_case(vehicle)
     try:
         move = plan_move(
             boom,
@@ -121,6 +138,9 @@ def plan(
             duration=duration,
             pitch=parse_pitch(pitch),
             hold=parse_hold(hold),
+            via=[parse_target(text) for text in via],
+            along=parse_along(along),
+            vehicle=case,
         )
     except InfeasibleError as error:
         if as_json:
@@ -138,7 +158,7 @@ def plan(
     from planner.recording import write_recording
 
     written = {"recording": out}
-    write_recording(out, boom, move.trajectory, move.loads, move.report)
+    write_recording(out, move)
     if csv_file is not None:
         write_csv(move.trajectory, csv_file, move.loads.tau)
         written["csv"] = csv_file
@@ -166,7 +186,7 @@ def ik(x: float, y: float, z: float, pitch: str, hold: str, boom_file: str | Non
     reason = None if found.best is not None else unreachable(boom, position, angle, held)
     if as_json:
         answer: dict[str, Any] = {
-            "target": {"position_m": position, "pitch_rad": angle, "hold": str(held)},
+            "target": {"position_m": position, "pitch_rad": found.pitch, "hold": str(held)},
             "solutions": [
                 {"q": s.q.tolist(), "within_limits": s.within_limits, "reasons": list(s.reasons)} for s in found.solutions
             ],
@@ -187,6 +207,75 @@ def ik(x: float, y: float, z: float, pitch: str, hold: str, boom_file: str | Non
         _console().print(table)
     if reason is not None:
         raise InfeasibleError(reason)
+    return 0
+
+
+@cli.command()
+@pitch_option
+@hold_option
+@payload_option
+@click.option("--out", default="reach.png", show_default=True, metavar="FILE.png|FILE.rrd", help="The picture or recording.")
+@boom_option
+@json_option
+def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str | None, as_json: bool) -> int:
+    """What the tip reaches in the arm's vertical plane, and with what torque to spare.
+
+    \b
+    Example:
+      boom reach --hold least-torque --payload 8 --out reach.png
+    """
+    from boom_model.reach import reach_map
+
+    if not out.endswith((".png", ".rrd")):
+        raise InputError(f"{out}: a reach map is written as .png or .rrd")
+    boom, angle, held = _load(boom_file, payload), parse_pitch(pitch), parse_hold(hold)
+    found = reach_map(boom, held, angle)
+    row, column = np.nonzero(found.within_limits)
+    answer: dict[str, Any] = {
+        "hold": str(held),
+        "pitch_rad": angle,
+        "payload_kg": boom.payload.mass,
+        "cells": found.exists.size,
+        "exists": int(found.exists.sum()),
+        "within_limits": len(row),
+        "overloaded": int((found.torque_margin < 0.0).sum()),
+        "files": {},
+    }
+    if not len(row):
+        reason = f"no tip position with pitch {np.degrees(angle):.4g} deg and hold {held} is within the limits"
+        if as_json:
+            _print_json(answer | {"reason": reason})
+        raise InfeasibleError(reason)
+    margin = found.torque_margin[row, column]
+    known = bool(np.isfinite(margin).all())
+    answer |= {
+        "largest_r_m": float(np.abs(found.r[column]).max()),
+        "lowest_z_m": float(found.z[row].min()),
+        "highest_z_m": float(found.z[row].max()),
+        "least_torque_margin": float(margin.min()) if known else None,
+        "largest_torque_margin": float(margin.max()) if known else None,
+    }
+    if out.endswith(".png"):
+        from planner.reach_picture import reach_title, write_reach_picture
+
+        write_reach_picture(out, boom, found, reach_title(boom, found))
+        answer["files"] = {"picture": out}
+    else:
+        from planner.recording import write_reach_recording
+
+        write_reach_recording(out, boom, found)
+        answer["files"] = {"recording": out}
+    if as_json:
+        _print_json(answer)
+        return 0
+    click.echo(
+        f"{answer['within_limits']} of {answer['cells']} cells are reached within the limits: r up to "
+        f"{answer['largest_r_m']:.2f} m, z from {answer['lowest_z_m']:.2f} to {answer['highest_z_m']:.2f} m"
+    )
+    if known:
+        click.echo(f"torque margin {margin.min():.3f} to {margin.max():.3f}; {answer['overloaded']} cells overload a drive")
+    for kind, name in answer["files"].items():
+        click.echo(f"{kind}: {name}")
     return 0
 
 
@@ -233,9 +322,12 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 @click.argument("motion", metavar="IN.csv")
 @payload_option
 @payload_as_option
+@vehicle_option
 @boom_option
 @json_option
-def check(motion: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
+def check(
+    motion: str, payload: float | None, payload_as: Any, vehicle: str | None, boom_file: str | None, as_json: bool
+) -> int:
     """Hold any motion against the joint limits and the drives' datasheets.
 
     \b
@@ -245,15 +337,17 @@ def check(motion: str, payload: float | None, payload_as: Any, boom_file: str | 
     """
     from planner.planning import check as check_motion
     from planner.trajectory import read_csv
+    from planner.vehicle import load_case
 
     boom, trajectory = _load(boom_file, payload), read_csv(motion)
-    return _print_report(check_motion(boom, trajectory, payload_as=payload_as), {}, as_json)
+    case = None if vehicle is None else load_case(vehicle)
+    return _print_report(check_motion(boom, trajectory, payload_as=payload_as, vehicle=case), {}, as_json)
 
 
 @cli.command()
 @json_option
 def validate(as_json: bool) -> int:
-    """The thesis's tables 2-5 to 2-8, row by row, against this model."""
+    """The thesis's tables 2-5 to 2-8 and section 3.5's loads, row by row, against this model."""
     from planner.validation import validate as validate_model
 
     rows = validate_model(Boom.load())
@@ -275,7 +369,7 @@ def validate(as_json: bool) -> int:
 @click.argument("recording", metavar="FILE.rrd", type=click.Path(exists=True, dir_okay=False))
 def view(recording: str) -> int:
     """Open a recording in the Rerun viewer."""
-    return subprocess.run([sys.executable, "-m", "rerun", recording], check=False).returncode
+    return subprocess.run([sys.executable, "-m", "rerun", "--bind", "127.0.0.1", recording], check=False).returncode
 
 
 def _load(boom_file: str | None, payload: float | None = None) -> Boom:
@@ -285,7 +379,7 @@ def _load(boom_file: str | None, payload: float | None = None) -> Boom:
 
 def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:
     from planner.checks import Verdict
-    from planner.report import cells
+    from planner.report import PEAK_HEADER, cells, peak_cells
 
     if as_json:
         _print_json(report.to_json(written))
@@ -296,6 +390,11 @@ def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> i
             table.add_row(*cells(row), style=_STYLES.get(row.verdict), end_section=last)
         console = _console()
         console.print(table)
+        console.print("Largest torques and where they come from (Nm, the extension's N)", highlight=False)
+        peaks = _table(*PEAK_HEADER)
+        for peak in report.peaks:
+            peaks.add_row(*peak_cells(peak))
+        console.print(peaks)
         _print_lines("Note", report.notes)
         _print_lines("Assumed", report.assumptions)
         console.print(f"{report.profile}, {report.duration:.3f} s", highlight=False)
@@ -324,8 +423,8 @@ def _complain(message: str) -> None:
 def _console() -> "Console":
     from rich.console import Console
 
-    console = Console()
-    return console if console.is_terminal else Console(width=_PIPE_WIDTH)
+    width = None if sys.stdout.isatty() else _PIPE_WIDTH
+    return Console(width=width, markup=False)  # a unit in brackets is no style
 
 
 def _table(*columns: str) -> "Table":

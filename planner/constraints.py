@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from boom_model import JOINTS, Boom, InfeasibleError, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array
+from boom_model.base_motion import BaseMotion
 from boom_model.drives import drive_inertia, drive_torque_limit
 from planner.path import Path
 from planner.time_law import TimeLaw
@@ -79,24 +80,25 @@ def drive_limits(boom: Boom, speed: ArrayLike) -> Array:
     return limits
 
 
-def path_dynamics(boom: Boom, path: Path, s: Array) -> PathDynamics:
-    """The path's demands at s (n,), with all the dynamics in one batch."""
+def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = None) -> PathDynamics:
+    """The path's demands at s (n,) on a base that is tilted at most, with all the dynamics in one batch."""
     p, p1, p2 = (path(s, order) for order in range(3))
     zero = np.zeros_like(p)
-    static, pushed, carried = inverse_dynamics(boom, [p, p, p], [zero, zero, p1], [zero, p1, p2], reactions=False).tau
+    states = [p, p, p], [zero, zero, p1], [zero, p1, p2]
+    static, pushed, carried = inverse_dynamics(boom, *states, base=base, reactions=False).tau
     inertia = np.array([drive_inertia(drive) if drive else 0.0 for drive in boom.drives])
     a, b = pushed - static + inertia * p1, carried - static + inertia * p2
     return PathDynamics(boom, path, s, p1, p2, a, b, static)
 
 
-def least_stretch(boom: Boom, path: Path, law: TimeLaw, samples: int = 2001) -> float:
+def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None, samples: int = 2001) -> float:
     """The factor by which a law must be slowed (or may be hastened, below 1) to keep the limits along its path.
 
     Slowed by k, a law's u and x fall as 1/k^2: the joint limits give k at once, the drives' by bisection above it. A load
     that a drive cannot even hold is left out, because no slowness mends it.
     """
     t = np.linspace(0.0, law.duration, samples)
-    demands = path_dynamics(boom, path, np.clip(np.asarray(law.s(t)), 0.0, 1.0))
+    demands = path_dynamics(boom, path, np.clip(np.asarray(law.s(t)), 0.0, 1.0), base)
     x, u = np.asarray(law.s(t, 1)) ** 2, np.asarray(law.s(t, 2))
     acceleration = np.abs(demands.p1 * u[:, None] + demands.p2 * x[:, None]) / boom.limits.acceleration
     least = float(np.sqrt(max(acceleration.max(), (x / demands.x_max).max())))

@@ -1,19 +1,22 @@
 """A move as one Rerun file: the moving linkage, every joint's plots beside its limits, the report, and how to show them.
 
-    /world                    z up; frames hang from "tf#/world", which is frame 1 of the boom [m]
-    /world/mount, /tip_path   static: the plate that the boom stands on, and the tip's whole path
-    /world/boom/<body>        its pose (frame "<body>" in "tf#/world") over time, and its solid; likewise /world/boom/tip
+    /world                    z up, the ground; frames hang from "tf#/world" [m]
+    /world/mount              frame "mount", which is frame 1 of the boom: tilt and heave of the vehicle, and its plate
+    /world/tip_path           the tip's whole path, static in "mount"
+    /world/boom/<body>        its pose (frame "<body>" in "mount") over time, and its solid; likewise /world/boom/tip
     /plots/<quantity>/<joint> q, qd, qdd, tau over time, in deg and m, Nm and N; /plots/q/linkage is theta3 - theta2
+    /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle, which add up to tau
+    /plots/mount/force, moment   of the boom on the mount, along frame 1 [N, Nm]
     .../limits                the limits beside it; those that do not change with the motion at the move's two ends only
     /report                   the report as Markdown
 
-The timeline is "t". The linkage comes solved: each body's frame is a child of the world, because a frame has one parent and
+The timeline is "t". The linkage comes solved: each body's frame is a child of the mount, because a frame has one parent and
 a closed loop cannot be shown. The solids' lengths are the model's, their thickness is for the eye only.
 """
 
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -21,14 +24,17 @@ import rerun as rr
 import rerun.blueprint as rrb
 from scipy.spatial.transform import Rotation
 
-from boom_model import JOINTS, Basis, Boom, Loads, body_transforms
+from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from boom_model.drives import drive_inertia, drive_torque_limit
 from boom_model.frames import R_LINK_BODY, frame_transforms
+from boom_model.reach import ReachMap
 from planner.files import replacing
-from planner.report import Report
+from planner.planning import Move
+from planner.reach_picture import OUTSIDE_LIMITS, margin_colors, margin_range, reach_title, reference_pose
 from planner.trajectory import Trajectory
+from planner.vehicle import VehicleCase, base_pose
 
 Color = tuple[int, int, int]
 
@@ -50,40 +56,104 @@ PAYLOAD_COLOR: Color = (230, 230, 230)
 _STEEL = 7850.0  # [kg/m^3]: the payload is shown as a ball of steel
 
 
-def write_recording(path: str | Path, boom: Boom, trajectory: Trajectory, loads: Loads, report: Report) -> None:
+def write_recording(path: str | Path, move: Move) -> None:
     """Writes a move's recording with its blueprint; `boom view` or `rerun` shows it.
 
     Args:
         path: the .rrd file.
-        loads: the trajectory's own, tau (n, 5).
 
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
     """
+    boom, trajectory, loads, report = move.boom, move.trajectory, move.loads, move.report
+    poses = body_transforms(boom, trajectory.q)
+    plots = _plots(boom, trajectory, loads)
+    bundles = _bundles(move)
+
+    def log(recording: rr.RecordingStream) -> None:
+        recording.send_blueprint(_blueprint(_eye(boom, trajectory.q), plots, bundles))
+        recording.log("report", rr.TextDocument(report.to_markdown(), media_type="text/markdown"), static=True)
+        _log_solids(recording, boom)
+        _log_motion(recording, trajectory.t, poses, move.vehicle)
+        for plot in (plot for tab in plots.values() for plot in tab):
+            _log_plot(recording, trajectory.t, plot)
+        for bundle in (bundle for tab in bundles.values() for bundle in tab):
+            _log_bundle(recording, trajectory.t, bundle)
+
     with replacing(path) as temporary:
-        Path(temporary).write_bytes(_encoded(boom, trajectory, loads, report))
+        Path(temporary).write_bytes(_encoded(f"{boom.name}: {report.profile}, {report.duration:.3f} s", log))
 
 
-def _encoded(boom: Boom, trajectory: Trajectory, loads: Loads, report: Report) -> bytes:
-    """The whole .rrd.
+def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> None:
+    """Writes a reach map as points in the arm's vertical plane, with the boom standing in it, and its blueprint.
+
+    /world/reach/within_limits   one point a cell, its colour the torque margin
+    /world/reach/outside_limits  what the linkage reaches, but only outside the limits
+    /world/reach/scale           the colours' margins, labelled
+    /reading                     what the map stands on
+
+    Args:
+        path: the .rrd file.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    q, pose = reference_pose(boom)
+    title = reach_title(boom, reach_map)
+    reading = f"{title}\n\nColour of a point: the torque margin [-], by the scale beside the map. Boom: {pose}."
+    x, z = np.meshgrid(reach_map.r, reach_map.z)
+    cells = np.stack([x, np.zeros_like(x), z], axis=-1)
+    half = min(float(np.diff(grid).min(initial=0.02)) for grid in (reach_map.r, reach_map.z)) / 2.0
+    shown = np.concatenate([cells[reach_map.exists], frame_transforms(boom, q, "outer")[:, :3, 3]])
+
+    def log(recording: rr.RecordingStream) -> None:
+        view = rrb.Spatial3DView(origin="/world", name="Reach [m]", eye_controls=_eye_on(shown, 0.0))
+        text = rrb.TextDocumentView(origin="/reading", name="Reading")
+        recording.send_blueprint(_shown_beside(view, text, [3, 1]))
+        recording.log("reading", rr.TextDocument(reading.replace("\n", "\n\n"), media_type="text/markdown"), static=True)
+        _log_solids(recording, boom)
+        _log_motion(recording, np.zeros(1), body_transforms(boom, q[None]), None)
+        _log_reach(recording, reach_map, cells, half)
+
+    with replacing(path) as temporary:
+        Path(temporary).write_bytes(_encoded(title.partition("\n")[0], log))
+
+
+def _log_reach(recording: rr.RecordingStream, reach_map: ReachMap, cells: Array, half: float) -> None:
+    """The cells (m, n, 3) of a map as points of radius `half` [m], and the scale of their colours."""
+
+    def log(name: str, points: rr.Points3D) -> None:
+        recording.log(f"world/reach/{name}", points, rr.CoordinateFrame("mount"), static=True)
+
+    within, margin = reach_map.within_limits, reach_map.torque_margin
+    known = bool(np.isfinite(margin).any())
+    between = margin_range(reach_map) if known else (0.0, 1.0)
+    colors = margin_colors(margin[within], between).astype(np.uint8)
+    log("within_limits", rr.Points3D(cells[within], colors=colors, radii=half))
+    outside = cells[reach_map.exists & ~within]
+    log("outside_limits", rr.Points3D(outside, colors=OUTSIDE_LIMITS, radii=half / 2.0))
+    if known:
+        levels = np.linspace(*between, 5)
+        height = np.linspace(reach_map.z[0], reach_map.z[-1], 5)
+        at = np.stack([np.full(5, reach_map.r[-1] + 0.2), np.zeros(5), height], axis=-1)
+        labels = [f"margin {level:.3g}" for level in levels]
+        colors = margin_colors(levels, between).astype(np.uint8)
+        log("scale", rr.Points3D(at, colors=colors, radii=0.05, labels=labels, show_labels=True))
+
+
+def _encoded(name: str, log: Callable[[rr.RecordingStream], None]) -> bytes:
+    """The whole .rrd of that name, with what `log` puts in.
 
     It is put together in memory: once a write fails, as on a full disk, Rerun's own file sink (0.41) waits for ever. Each
     recording has an id of its own, as the viewer would merge two that share one.
     """
-    poses = body_transforms(boom, trajectory.q)
-    plots = _plots(boom, trajectory, loads)
     strict = rr.strict_mode()
     rr.set_strict_mode(True)  # a misuse of Rerun raises, and is not a line in a log
     try:
         with rr.RecordingStream("boom", recording_id=uuid.uuid4()) as recording:
             memory = recording.memory_recording()
-            recording.send_blueprint(_blueprint(_eye(boom, trajectory.q), plots))
-            recording.send_recording_name(f"{boom.name}: {report.profile}, {report.duration:.3f} s")
-            recording.log("report", rr.TextDocument(report.to_markdown(), media_type="text/markdown"), static=True)
-            _log_solids(recording, boom)
-            _log_motion(recording, trajectory.t, poses)
-            for plot in (plot for tab in plots.values() for plot in tab):
-                _log_plot(recording, trajectory.t, plot)
+            recording.send_recording_name(name)
+            log(recording)
         return memory.drain_as_bytes()
     finally:
         rr.set_strict_mode(strict)
@@ -96,17 +166,24 @@ def _time(t: Array) -> rr.TimeColumn:
 # The linkage
 
 
-def _log_motion(recording: rr.RecordingStream, t: Array, poses: Mapping[str, Array]) -> None:
-    for name, T in poses.items():
+def _log_motion(recording: rr.RecordingStream, t: Array, poses: Mapping[str, Array], vehicle: VehicleCase | None) -> None:
+    def log(entity: str, T: Array, parent: str, child: str, times: Array) -> None:
         motion = rr.Transform3D.columns(
             translation=T[:, :3, 3],
             quaternion=Rotation.from_matrix(T[:, :3, :3]).as_quat(),
-            parent_frame=["tf#/world"] * len(t),
-            child_frame=[name] * len(t),
+            parent_frame=[parent] * len(times),
+            child_frame=[child] * len(times),
         )
-        recording.send_columns(f"world/boom/{name}", [_time(t)], motion)
+        recording.send_columns(entity, [_time(times)], motion)
+
+    if vehicle is None:
+        log("world/mount", np.eye(4)[None], "tf#/world", "mount", t[:1])
+    else:
+        log("world/mount", base_pose(vehicle, t), "tf#/world", "mount", t)
+    for name, T in poses.items():
+        log(f"world/boom/{name}", T, "mount", name, t)
     path = rr.LineStrips3D([poses["tip"][:, :3, 3]], colors=[PAYLOAD_COLOR], radii=[0.004])
-    recording.log("world/tip_path", path, static=True)
+    recording.log("world/tip_path", path, rr.CoordinateFrame("mount"), static=True)
 
 
 def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
@@ -114,7 +191,7 @@ def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
         recording.log(name, shape, *([] if frame is None else [rr.CoordinateFrame(frame)]), static=True)
 
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    log("world/mount", _boxes(np.array([[-0.2, -0.2, -0.02]]), np.array([[0.2, 0.2, 0.0]]), PIN_COLOR))
+    log("world/mount", _boxes(np.array([[-0.2, -0.2, -0.02]]), np.array([[0.2, 0.2, 0.0]]), PIN_COLOR), "mount")
     for name, bars in _bars(boom).items():
         R = R_LINK_BODY[name]
         low, high = (np.array([corner(bar) for bar in bars]) @ R for corner in (_Bar.low, _Bar.high))
@@ -272,15 +349,65 @@ def _log_plot(recording: rr.RecordingStream, t: Array, plot: _Plot) -> None:
         recording.send_columns(entity, [_time(times)], rr.Scalars.columns(scalars=values))
 
 
+@dataclass(frozen=True, eq=False)
+class _Bundle:
+    """Several curves of one kind in one view."""
+
+    entity: str
+    title: str
+    names: Sequence[str]
+    colors: Sequence[Color]
+    values: Array
+    """(n, curves)"""
+
+
+_PART_BODIES = ("inner", "outer", "lower", "upper", "base", "end_effector")
+PART_COLORS = dict(zip((f.name for f in fields(Breakdown)), (COLORS[b] for b in _PART_BODIES), strict=True))
+
+
+def _bundles(move: Move) -> dict[str, list[_Bundle]]:
+    """The tabs whose views hold several curves: the torques' parts, and the wrench on the mount."""
+    parts, total = [getattr(move.parts, name) for name in PART_COLORS], move.parts.total
+    names = [*PART_COLORS, "total"]
+    tabs: dict[str, list[_Bundle]] = {"Torque parts": [], "Mount": []}
+    for i, joint in enumerate(JOINTS):
+        unit = "N" if IS_LENGTH[i] else "Nm"
+        values = np.stack([part[:, i] for part in (*parts, total)], axis=-1)
+        colors = [*PART_COLORS.values(), PAYLOAD_COLOR]
+        tabs["Torque parts"].append(_Bundle(f"plots/parts/{joint}", f"{joint} [{unit}]", names, colors, values))
+    if move.loads.mount is not None:
+        axes = [COLORS["inner"], COLORS["upper"], COLORS["end_effector"]]
+        for kind, unit, columns in (("force", "N", slice(0, 3)), ("moment", "Nm", slice(3, 6))):
+            values = move.loads.mount[:, columns]
+            title = f"{kind} on the mount [{unit}]"
+            tabs["Mount"].append(_Bundle(f"plots/mount/{kind}", title, [f"{a} [{unit}]" for a in "xyz"], axes, values))
+    return tabs
+
+
+def _log_bundle(recording: rr.RecordingStream, t: Array, bundle: _Bundle) -> None:
+    style = rr.SeriesLines if len(t) > 1 else rr.SeriesPoints
+    recording.log(bundle.entity, style(names=bundle.names, colors=bundle.colors), static=True)
+    recording.send_columns(bundle.entity, [_time(t)], rr.Scalars.columns(scalars=bundle.values))
+
+
 # How it is shown
 
 
-def _blueprint(eye: rrb.EyeControls3D, plots: Mapping[str, Sequence[_Plot]]) -> rrb.Blueprint:
+def _blueprint(
+    eye: rrb.EyeControls3D, plots: Mapping[str, Sequence[_Plot]], bundles: Mapping[str, Sequence[_Bundle]]
+) -> rrb.Blueprint:
     tabs = [rrb.Grid(*(_plot_view(plot) for plot in tab), grid_columns=2, name=name) for name, tab in plots.items()]
+    for name, tab in bundles.items():
+        views = [rrb.TimeSeriesView(origin=f"/{bundle.entity}", name=bundle.title) for bundle in tab]
+        tabs.append(rrb.Grid(*views, grid_columns=2 if len(views) > 2 else 1, name=name))
     report = rrb.TextDocumentView(origin="/report", name="Report")
     boom = rrb.Spatial3DView(origin="/world", name="Boom [m]", eye_controls=eye)
+    return _shown_beside(boom, rrb.Tabs(*tabs, report, active_tab=0), [1, 1])
+
+
+def _shown_beside(left: rrb.View, right: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blueprint:
     return rrb.Blueprint(
-        rrb.Horizontal(boom, rrb.Tabs(*tabs, report, active_tab=0), column_shares=[1, 1]),
+        rrb.Horizontal(left, right, column_shares=shares),
         rrb.TimePanel(timeline="t", state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
@@ -296,8 +423,12 @@ def _plot_view(plot: _Plot) -> rrb.TimeSeriesView:
 def _eye(boom: Boom, q: Array) -> rrb.EyeControls3D:
     """From the boom's right at the middle of its move, a little from above, and far enough off to see all of it."""
     points = frame_transforms(boom, q, "outer")[..., :3, 3].reshape(-1, 3)
+    return _eye_on(points, float(q[len(q) // 2, 0]))
+
+
+def _eye_on(points: Array, yaw: float) -> rrb.EyeControls3D:
+    """From the right of a boom at `yaw`, a little from above, and far enough off to see all points (k, 3)."""
     center = (points.min(axis=0) + points.max(axis=0)) / 2.0
-    yaw = q[len(q) // 2, 0]
     direction = np.array([np.sin(yaw), -np.cos(yaw), 0.5])
     distance = 0.5 + 1.1 * float(np.linalg.norm(np.ptp(points, axis=0)))
     eye = center + distance * direction / np.linalg.norm(direction)

@@ -1,14 +1,41 @@
 """A motion's report: its rows, what was assumed, and the verdict."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
-from boom_model import JOINTS, Basis, Boom
+from boom_model import JOINTS, Basis, Boom, Breakdown
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
-from planner.checks import Row, Verdict, overall
+from planner.checks import ANGLE_CHECKS, Row, Verdict, overall
+
+
+@dataclass(frozen=True)
+class TorquePeak:
+    """The largest torque of a joint and its parts, in Nm (N for the extension); the parts add up to the total."""
+
+    joint: str
+    unit: str
+    at_s: float
+    gravity: float
+    inertia: float
+    velocity: float
+    payload: float
+    friction: float
+    vehicle: float
+    total: float
+
+
+def torque_peaks(t: Array, parts: Breakdown) -> tuple[TorquePeak, ...]:
+    """The largest |torque| of each joint over times t (n,), in parts."""
+    total = parts.total
+    peaks = []
+    for i, at in enumerate(np.abs(total).argmax(axis=0)):
+        shares = {field.name: float(getattr(parts, field.name)[at, i]) for field in fields(parts)}
+        unit = "N" if IS_LENGTH[i] else "Nm"
+        peaks.append(TorquePeak(joint=JOINTS[i], unit=unit, at_s=float(t[at]), total=float(total[at, i]), **shares))
+    return tuple(peaks)
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +50,8 @@ class Report:
     """What a reader must know of the motion or its data."""
     assumptions: tuple[str, ...]
     """Every assumed figure of the boom that the checks or the planner use."""
+    peaks: tuple[TorquePeak, ...] = ()
+    """Where each joint's largest torque comes from."""
 
     @property
     def verdict(self) -> Verdict:
@@ -32,7 +61,7 @@ class Report:
     def summary(self) -> str:
         """The verdict in a sentence, with what decides it."""
         failed = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.FAIL]
-        unknown = sorted({r.joint for r in self.rows if r.verdict is Verdict.NOT_CHECKABLE}, key=JOINTS.index)
+        unknown = list(dict.fromkeys(r.joint for r in self.rows if r.verdict is Verdict.NOT_CHECKABLE))
         warned = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.WARN]
         parts = [f"failed: {', '.join(failed)}"] if failed else []
         parts += [f"close to an estimated or assumed limit: {', '.join(warned)}"] if warned else []
@@ -48,6 +77,7 @@ class Report:
             "checks": [asdict(row) for row in self.rows],
             "notes": list(self.notes),
             "assumptions": list(self.assumptions),
+            "torque_peaks": [asdict(peak) for peak in self.peaks],
             "files": files,
         }
 
@@ -63,6 +93,10 @@ class Report:
             "|" + " --- |" * len(header),
         ]
         lines += ["| " + " | ".join((*cells(row), row.source)) + " |" for row in self.rows]
+        if self.peaks:
+            lines += ["", "## Largest torques and where they come from", "", "| " + " | ".join(PEAK_HEADER) + " |"]
+            lines += ["|" + " --- |" * len(PEAK_HEADER)]
+            lines += ["| " + " | ".join(peak_cells(peak)) + " |" for peak in self.peaks]
         for title, texts in (("Notes", self.notes), ("Assumed", self.assumptions)):
             if texts:
                 lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
@@ -74,7 +108,7 @@ def cells(row: Row) -> tuple[str, ...]:
     factor, unit = _for_people(row)
     if row.margin is None:
         margin = "-"
-    elif row.check in ("position", "lower - inner"):
+    elif row.check in ANGLE_CHECKS:
         margin = f"{row.margin * factor:.4g} {unit}"
     else:
         margin = f"{row.margin:.0%}"
@@ -89,6 +123,15 @@ def cells(row: Row) -> tuple[str, ...]:
         row.verdict,
         row.basis or "-",
     )
+
+
+PEAK_HEADER = ("joint", "at", "total", "gravity", "inertia", "velocity", "payload", "friction", "vehicle")
+
+
+def peak_cells(peak: TorquePeak) -> tuple[str, ...]:
+    """A torque peak for people, under PEAK_HEADER."""
+    parts = (peak.gravity, peak.inertia, peak.velocity, peak.payload, peak.friction, peak.vehicle)
+    return (peak.joint, f"{peak.at_s:.2f} s", f"{peak.total:.2f} {peak.unit}", *(f"{part:.2f}" for part in parts))
 
 
 def _for_people(row: Row) -> tuple[float, str]:
@@ -113,9 +156,16 @@ def assumptions(boom: Boom, jerk_limited: bool) -> tuple[str, ...]:
                 value = f"{values[i]:g} m{per}" if IS_LENGTH[i] else f"{np.degrees(values[i]):g} deg{per}"
                 sentences.append(f"{JOINTS[i]} {name} limit {value}: {origin.source}")
     for joint, drive in zip(JOINTS, boom.drives, strict=True):
-        voltage, wiring = (None, None) if drive is None else (drive.bus_voltage, drive.wiring)
+        if drive is None:
+            continue
+        voltage, wiring, brake = drive.bus_voltage, drive.wiring, drive.brake
         if voltage is not None and voltage.origin.basis is Basis.ASSUMED:
             sentences.append(f"{joint} bus voltage {voltage.value:g} V: {voltage.origin.source}")
         if wiring is not None and wiring.origin.basis is Basis.ASSUMED:
             sentences.append(f"{joint} wiring {wiring.value}: {wiring.origin.source}")
+        if brake is not None and brake.origin.basis is Basis.ASSUMED:
+            sentences.append(f"{joint} brake {'present' if brake.value else 'absent'}: {brake.origin.source}")
+    if limits.origins["transmission"][0].basis is Basis.ASSUMED:
+        angle = np.degrees(limits.transmission)
+        sentences.append(f"transmission angle warned of below {angle:g} deg: {limits.origins['transmission'][0].source}")
     return tuple(sentences)

@@ -10,16 +10,24 @@ from boom_model import (
     ActuatorHorizontal,
     Boom,
     FixedExtension,
+    Hold,
     InfeasibleError,
     InputError,
+    LargestMargin,
+    LeastExtension,
+    LeastTorque,
+    NearestHorizontal,
+    NearestPose,
     inverse_kinematics,
     nearest_reachable,
 )
 from boom_model.arrays import Array, checked
-from boom_model.inverse_kinematics import Hold
 
 PITCHES = {"down": -np.pi / 2.0, "level": 0.0, "up": np.pi / 2.0}
-HOLDS = "horizontal, actuator=DEG, extension=M"
+CHOICES = {
+    str(hold): hold for hold in (ActuatorHorizontal(), LeastExtension(), NearestHorizontal(), LeastTorque(), LargestMargin())
+}
+HOLDS = f"{', '.join(CHOICES)}, actuator=DEG, extension=M, nearest=DEG,DEG,DEG,M,DEG"
 
 
 @dataclass(frozen=True)
@@ -43,24 +51,38 @@ def parse_target(text: str) -> Target:
     if not equals:
         return text
     if kind == "q":
-        q = np.array(_numbers(text, rest, 5))
-        q[[0, 1, 2, 4]] = np.radians(q[[0, 1, 2, 4]])
-        return q
+        return _joint_position(text, rest)
     if kind == "tip":
         x, y, z = _numbers(text, rest, 3)
         return TipTarget((x, y, z))
     raise InputError(f"{text!r} is no target; give a pose's name, q=DEG,DEG,DEG,M,DEG or tip=X,Y,Z")
 
 
-def parse_pitch(text: str) -> float:
-    """A pitch as people write it: down, level, up, or degrees above the horizontal; in rad.
+def parse_pitch(text: str) -> float | None:
+    """A pitch as people write it: down, level, up, or degrees above the horizontal, in rad; free is None.
 
     Raises:
         InputError: none of these.
     """
+    if text == "free":
+        return None
     if text in PITCHES:
         return PITCHES[text]
-    return float(np.radians(_number("pitch", text, "down, level, up or degrees")))
+    return float(np.radians(_number("pitch", text, "down, level, up, free or degrees")))
+
+
+def parse_along(text: str) -> str | Array:
+    """What leads a move, as people write it: joint, line, or the point of an arc, arc=X,Y,Z (m).
+
+    Raises:
+        InputError: none of these.
+    """
+    if text in ("joint", "line"):
+        return text
+    kind, _, rest = text.partition("=")
+    if kind != "arc":
+        raise InputError(f"along {text!r} is not known; there are: joint, line, arc=X,Y,Z")
+    return np.array(_numbers(text, rest, 3))
 
 
 def parse_hold(text: str) -> Hold:
@@ -70,8 +92,10 @@ def parse_hold(text: str) -> Hold:
         InputError: none of the holds, or its value is not a finite number.
     """
     kind, equals, rest = text.partition("=")
-    if text == "horizontal":
-        return ActuatorHorizontal()
+    if text in CHOICES:
+        return CHOICES[text]
+    if kind == "nearest" and equals:
+        return NearestPose.to(_joint_position(text, rest))
     if kind == "actuator" and equals:
         return ActuatorAngle(float(np.radians(_number("hold actuator", rest, "degrees"))))
     if kind == "extension" and equals:
@@ -79,7 +103,7 @@ def parse_hold(text: str) -> Hold:
     raise InputError(f"hold {text!r} is not known; there are: {HOLDS}")
 
 
-def resolve(boom: Boom, target: Target, pitch: float, hold: Hold, reference: ArrayLike | None = None) -> Array:
+def resolve(boom: Boom, target: Target, pitch: float | None, hold: Hold, reference: ArrayLike | None = None) -> Array:
     """The joint position (5,) of a target, within the limits.
 
     Args:
@@ -101,21 +125,22 @@ def resolve(boom: Boom, target: Target, pitch: float, hold: Hold, reference: Arr
     return q
 
 
-def _tip(boom: Boom, target: TipTarget, pitch: float, hold: Hold, reference: ArrayLike | None) -> Array:
+def _tip(boom: Boom, target: TipTarget, pitch: float | None, hold: Hold, reference: ArrayLike | None) -> Array:
     found = inverse_kinematics(boom, target.position, pitch, hold, reference)
     if found.best is not None:
         return found.solutions[found.best].q
     raise InfeasibleError(unreachable(boom, target.position, pitch, hold))
 
 
-def unreachable(boom: Boom, position: ArrayLike, pitch: float, hold: Hold) -> str:
+def unreachable(boom: Boom, position: ArrayLike, pitch: float | None, hold: Hold) -> str:
     """Why no branch within the limits reaches a target: how far out of reach, or which limits each branch breaks.
 
     Raises:
         InputError: position is not finite or not (3,).
     """
     found = inverse_kinematics(boom, position, pitch, hold)
-    head = f"tip {_point(np.asarray(position))} with pitch {np.degrees(pitch):.4g} deg and hold {hold}"
+    free, pitch = " (free)" if pitch is None else "", found.pitch
+    head = f"tip {_point(np.asarray(position))} with pitch {np.degrees(pitch):.4g} deg{free} and hold {hold}"
     nearest = nearest_reachable(boom, position, pitch, hold)
     if nearest is None:
         tail = "no point on the line from it to the base can be reached with this pitch and hold"
@@ -133,6 +158,12 @@ def unreachable(boom: Boom, position: ArrayLike, pitch: float, hold: Hold) -> st
 
 def _point(position: Array) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in position) + ") m"
+
+
+def _joint_position(text: str, rest: str) -> Array:
+    q = np.array(_numbers(text, rest, 5))
+    q[[0, 1, 2, 4]] = np.radians(q[[0, 1, 2, 4]])
+    return q
 
 
 def _numbers(text: str, rest: str, count: int) -> list[float]:

@@ -1,5 +1,6 @@
 """A sampled motion, and its CSV form."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,10 +83,22 @@ def sample(motion: Motion, step: float = STEP) -> Trajectory:
     return Trajectory.from_samples(t, q, qd, qdd, qddd if motion.law.jerk_limited else None)
 
 
-def at_rest(q: Array) -> Trajectory:
+def joined(parts: Sequence[Trajectory], notes: tuple[str, ...] = ()) -> Trajectory:
+    """Trajectories one after the other, each from the rest in which the one before ends; that sample stands once."""
+    starts = np.concatenate([[0.0], np.cumsum([part.t[-1] for part in parts])])
+    kept = [slice(None), *[slice(1, None)] * (len(parts) - 1)]
+    t = np.concatenate([part.t[k] + start for part, k, start in zip(parts, kept, starts[:-1], strict=True)])
+    q, qd, qdd = (
+        np.concatenate([getattr(part, name)[k] for part, k in zip(parts, kept, strict=True)]) for name in ("q", "qd", "qdd")
+    )
+    jerks = [part.qddd[k] for part, k in zip(parts, kept, strict=True) if part.qddd is not None]
+    return Trajectory.from_samples(t, q, qd, qdd, np.concatenate(jerks) if len(jerks) == len(parts) else None, notes)
+
+
+def at_rest(q: Array, notes: tuple[str, ...] = ()) -> Trajectory:
     """The empty move: one sample, standing still at q (5,)."""
     zero = np.zeros((1, 5))
-    return Trajectory.from_samples([0.0], q[None], zero, zero)
+    return Trajectory.from_samples([0.0], q[None], zero, zero, notes=notes)
 
 
 def write_csv(trajectory: Trajectory, path: str | Path, tau: Array | None = None) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from boom_model import Basis, Boom, InputError, Origin, Sourced, inverse_dynamics
+from boom_model import Basis, Boom, Friction, InputError, Mount, Origin, Sourced, inverse_dynamics
 from planner import Trajectory, Verdict, average_torque, check, plan, sample
 from planner.validation import table_2_4_motion
 
@@ -176,3 +176,56 @@ def test_jerk_is_checked_where_it_was_limited():
 def test_payload_as_is_checked():
     with pytest.raises(InputError, match="payload_as"):
         check(BOOM, PATH, payload_as="weight")
+
+
+@pytest.mark.parametrize(
+    ("brake", "verdict"),
+    [
+        (None, Verdict.FAIL),
+        (Sourced(False, Origin(Basis.PRINTED, "drawing")), Verdict.FAIL),
+        (Sourced(True, Origin(Basis.ASSUMED, "hoped for")), Verdict.WARN),
+        (Sourced(True, Origin(Basis.PRINTED, "drawing")), Verdict.PASS),
+    ],
+)
+def test_power_off_needs_a_brake_that_is_declared(brake, verdict):
+    report = check(with_drives(brake=brake), PATH)
+    row = rows_of(report, "inner", "power-off hold")
+    assert row.verdict is verdict
+    assert row.limit == 29.0
+    assert row.demand == rows_of(report, "inner", "gearbox hold").demand
+
+
+def test_mount_rows_are_the_wrenchs_sizes_and_need_limits():
+    trajectory = held_still(BOOM.pose("phenotyping"))
+    mount = inverse_dynamics(BOOM, trajectory.q[0], np.zeros(5), np.zeros(5)).mount
+    report = check(BOOM, trajectory)
+    assert rows_of(report, "mount", "peak force").demand == pytest.approx((BOOM.mass + 10.0) * 9.81, rel=1e-12)
+    assert rows_of(report, "mount", "peak moment").demand == pytest.approx(np.linalg.norm(mount[3:]), rel=1e-12)
+    assert rows_of(report, "mount", "peak moment").verdict is Verdict.NOT_CHECKABLE
+    weak = replace(
+        BOOM, mount=Mount(Sourced(1e4, Origin(Basis.PRINTED, "drawing")), Sourced(100.0, Origin(Basis.ASSUMED, "guess")))
+    )
+    verdicts = [rows_of(check(weak, trajectory), "mount", name).verdict for name in ("peak force", "peak moment")]
+    assert verdicts == [Verdict.PASS, Verdict.FAIL]
+
+
+@pytest.mark.parametrize(("gap", "verdict"), [(16.0, Verdict.PASS), (14.0, Verdict.WARN), (166.0, Verdict.WARN)])
+def test_a_nearly_flat_parallelogram_is_warned_of(gap, verdict):
+    row = rows_of(check(BOOM, held_still(np.radians([0.0, 10.0, 10.0 + gap, 0.0, 0.0]))), "lower", "transmission angle")
+    assert row.verdict is verdict
+    assert np.degrees(row.demand) == pytest.approx(min(gap, 180.0 - gap), abs=1e-9)
+
+
+def test_friction_enters_the_checks_where_it_is_known():
+    rough = replace(BOOM, friction=Friction(np.full(5, 2.0), np.full(5, 7.0), (Origin(Basis.PRINTED, "bench"),) * 5))
+    peaks = [{peak.joint: peak for peak in check(boom, PATH).peaks}["lower"] for boom in (BOOM, rough)]
+    assert peaks[0].friction == 0.0
+    moving = check(rough, plan(BOOM, "transport", "phenotyping").trajectory)
+    smooth = check(BOOM, plan(BOOM, "transport", "phenotyping").trajectory)
+    assert rows_of(moving, "yaw", "drive RMS torque").demand > rows_of(smooth, "yaw", "drive RMS torque").demand
+
+
+def test_torque_peaks_add_up():
+    for peak in plan(BOOM, "transport", "phenotyping").report.peaks:
+        parts = peak.gravity + peak.inertia + peak.velocity + peak.payload + peak.friction + peak.vehicle
+        assert parts == pytest.approx(peak.total, rel=1e-12)

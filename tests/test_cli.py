@@ -31,7 +31,7 @@ def test_plan_does_the_main_job(boom, tmp_path):
     code, out, err = boom("plan", "transport", "phenotyping", "--csv", "move.csv")
     assert (code, err) == (0, "")
     assert sorted(os.listdir(tmp_path)) == ["move.csv", "move.rrd"]
-    assert "INCOMPLETE: not checkable for want of data: yaw" in out
+    assert "not checkable for want of data: yaw, inner, lower, extension, wrist, mount" in out
     assert "Assumed: lower bus voltage 80 V" in out
     expected = plan(Boom.load(), "transport", "phenotyping")
     np.testing.assert_array_equal(read_csv("move.csv").q, expected.trajectory.q)
@@ -56,6 +56,22 @@ def test_plan_takes_payload_duration_and_boom(boom, tmp_path):
     assert code == 0
     light = plan(Boom.load().with_payload(5.0), "transport", "phenotyping", duration=7.0).report
     assert json.loads(out)["checks"] == json.loads(json.dumps(light.to_json({})))["checks"]
+
+
+def test_vehicle_is_taken_by_plan_and_check(boom):
+    code, out, _ = boom("plan", "transport", "phenotyping", "--vehicle", "slope", "--csv", "move.csv", "--json")
+    planned = json.loads(out)
+    assert code == 0
+    assert "slope: roll 8.5 deg" in planned["notes"][0]
+    code, out, _ = boom("check", "move.csv", "--vehicle", "slope", "--json")
+    holds = [
+        next(row["demand"] for row in answer["checks"] if (row["joint"], row["check"]) == ("yaw", "drive worst hold"))
+        for answer in (planned, json.loads(out))
+    ]
+    assert holds[0] == pytest.approx(holds[1], rel=1e-3)
+    assert holds[0] > 5.0
+    code, _, err = boom("check", "move.csv", "--vehicle", "swamp")
+    assert (code, "unknown vehicle case 'swamp'" in err) == (2, True)
 
 
 def test_empty_move_is_said_so(boom):
@@ -117,7 +133,7 @@ def test_validate_holds(boom):
     assert answer["ok"] is True
     assert set(answer["rows"][0]) == {"table", "row", "quantity", "expected", "actual", "tolerance", "ok", "note"}
     code, out, _ = boom("validate")
-    assert "148 of 148 rows hold" in out
+    assert "166 of 166 rows hold" in out
 
 
 @pytest.mark.parametrize(

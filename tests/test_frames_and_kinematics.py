@@ -1,16 +1,43 @@
-"""Frames of both loops and the closed forms against each other, MuJoCo's tree, differences and the thesis."""
+"""Frames of both loops, the closed forms and the motion of every body against each other, MuJoCo's tree, the textbook
+recursion, differences and the thesis."""
+
+from dataclasses import fields
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from boom_model.arrays import Array
+from boom_model.base_motion import BaseMotion
 from boom_model.boom import Boom
 from boom_model.errors import InputError
 from boom_model.frames import BODY_FRAMES, R_LINK_BODY, body_transforms, dh_rows, frame_transforms
-from boom_model.kinematics import forward_kinematics, jacobian
-from tests.oracles import derivative, mujoco_kinematics, random_states, textbook_recursion, turning
+from boom_model.kinematics import (
+    FrameMotion,
+    body_motion,
+    forward_kinematics,
+    frame_motion,
+    jacobian,
+    jacobian_rate,
+    manipulability,
+    transmission_angle,
+)
+from tests.oracles import (
+    BOOMS,
+    UP,
+    derivative,
+    instants,
+    mujoco_kinematics,
+    mujoco_motion,
+    random_base,
+    random_states,
+    textbook_recursion,
+    turning,
+)
 
 BOOM = Boom.load()
+LOOPS = pytest.mark.parametrize("loop", ["inner", "outer"])
+MOTIONS = ("velocity", "angular_velocity", "acceleration", "angular_acceleration")
 ROUNDING = 4e-15  # of positions of some 3 m, and of rotations
 
 
@@ -135,15 +162,155 @@ def test_jacobian_is_the_derivative_of_the_pose():
         assert_equal(J[:, 3:, i], turning(R, dR), tolerance=4e-13)
 
 
-@pytest.mark.parametrize("loop", ["inner", "outer"])
-def test_jacobian_carries_the_motion_of_the_recursion(loop):
-    for q, qd, qdd in zip(*random_states(BOOM, 50, np.random.default_rng(9)), strict=True):
-        tip, R = textbook_recursion(BOOM, q, qd, qdd, loop)[10], forward_kinematics(BOOM, q).rotation
-        J = jacobian(BOOM, q)
-        Jd = derivative(lambda s, q=q, qd=qd: jacobian(BOOM, q + s * qd), h=4e-3)
-        assert_equal(J @ qd, np.concatenate([R @ tip.v, R @ tip.w]), tolerance=1e-14)
-        gravity = np.array([0.0, 0.0, BOOM.gravity, 0.0, 0.0, 0.0])
-        assert_equal(J @ qdd + Jd @ qd + gravity, np.concatenate([R @ tip.vd, R @ tip.wd]), tolerance=1e-12)
+def test_jacobian_rate_is_the_derivative_of_the_jacobian():
+    q, qd, _ = random_states(BOOM, 100, np.random.default_rng(9))
+    assert_equal(jacobian_rate(BOOM, q, qd), derivative(lambda s: jacobian(BOOM, q + s * qd), h=4e-3), tolerance=1e-12)
+
+
+@LOOPS
+def test_jacobian_and_its_rate_carry_the_motion_of_the_tip(loop):
+    q, qd, qdd = random_states(BOOM, 200, np.random.default_rng(11))
+    J, Jd, motion = jacobian(BOOM, q), jacobian_rate(BOOM, q, qd), frame_motion(BOOM, q, qd, qdd, loop)
+    velocity = np.einsum("nij,nj->ni", J, qd)
+    acceleration = np.einsum("nij,nj->ni", J, qdd) + np.einsum("nij,nj->ni", Jd, qd)
+    assert_equal(velocity, tip_twist(motion.velocity, motion.angular_velocity), tolerance=1e-14)
+    assert_equal(acceleration, tip_twist(motion.acceleration, motion.angular_acceleration), tolerance=3e-14)
+
+
+def tip_twist(linear: Array, angular: Array) -> Array:
+    return np.concatenate([linear[:, 10], angular[:, 10]], axis=-1)
+
+
+def test_manipulability_is_the_product_of_the_singular_values():
+    q = positions(200, 12)
+    expected = np.prod(np.linalg.svd(jacobian(BOOM, q)[:, :3], compute_uv=False), axis=-1)
+    assert_equal(manipulability(BOOM, q), expected, tolerance=1e-14)
+
+
+def on_the_yaw_axis() -> Array:
+    """Actuator and end effector upright, and the inner link leaning back over the base."""
+    g = BOOM.geometry
+    return np.array([0.0, np.arccos(-(g.L2 + g.L6 - g.L8) / g.L9), np.pi / 2, 0.3, 0.0])
+
+
+def drawn_in_beyond_its_pin() -> Array:
+    """rho = 0, end effector along the actuator and inner link across it: all of the plane's columns are parallel."""
+    return np.array([0.0, 0.4, 0.4 + np.pi / 2, -BOOM.geometry.L7, 0.0])
+
+
+@pytest.mark.parametrize("pose", [on_the_yaw_axis, drawn_in_beyond_its_pin])
+def test_manipulability_vanishes_in_singular_poses(pose):
+    """To the root of rounding, whatever the yaw; a determinant that rounds below 0 is 0."""
+    q = np.tile(pose(), (200, 1))
+    q[:, 0] = np.linspace(0.0, 2 * np.pi, 200)
+    measure = manipulability(BOOM, q)
+    assert measure[0] < 1e-15
+    assert (measure < 1e-7).all()
+    q[:, [1, 3]] += 0.1
+    assert (manipulability(BOOM, q) > 0.01).all()
+
+
+@pytest.mark.parametrize(("gap", "angle"), [(0, 0), (5, 5), (90, 90), (120, 60), (175, 5), (180, 0), (-30, 30), (-150, 30)])
+@pytest.mark.parametrize("inner", [0.0, 60.0, 100.0])
+def test_transmission_angle_is_the_acute_angle_between_the_links(inner, gap, angle):
+    q = np.radians([30.0, inner, inner + gap, 0.0, 40.0])
+    assert_equal(transmission_angle(q), np.radians(angle), tolerance=1e-15)
+
+
+@LOOPS
+def test_frame_motion_is_the_textbook_recursion(loop):
+    rng = np.random.default_rng(13)
+    states, base = random_states(BOOM, 50, rng), random_base(rng, 50)
+    motion = frame_motion(BOOM, *states, loop, base)
+    R = motion.T[..., :3, :3]
+    expected = [textbook_recursion(BOOM, *state, loop, now) for *state, now in zip(*states, instants(base, 50), strict=True)]
+    w, w1, v, a = np.einsum("nfij,nfpj->pnfi", R, expected)
+    assert_equal(motion.velocity, v, tolerance=3e-14)
+    assert_equal(motion.angular_velocity, w, tolerance=1e-14)
+    assert_equal(motion.acceleration + BOOM.gravity * base.up[:, None], a, tolerance=1e-13)
+    assert_equal(motion.angular_acceleration, w1, tolerance=3e-14)
+
+
+def test_both_loops_move_alike_outboard_of_the_linkage():
+    rng = np.random.default_rng(14)
+    states, base = random_states(BOOM, 200, rng), random_base(rng)
+    inner, outer = (frame_motion(BOOM, *states, loop, base) for loop in ("inner", "outer"))
+    for part in MOTIONS:
+        assert_equal(getattr(inner, part)[:, 7:], getattr(outer, part)[:, 7:], tolerance=4e-14)
+
+
+def joint_motion(t: Array) -> tuple[Array, Array, Array]:
+    """Every joint swings about the middle of its range; t (n,)."""
+    limits, frequency = BOOM.limits, np.array([0.7, 1.1, 0.9, 1.3, 1.7])
+    centre, swing = (limits.upper + limits.lower) / 2, (limits.upper - limits.lower) / 4
+    angle = t[:, None] * frequency + [0.1, 0.5, 1.2, 2.0, 2.8]
+    return centre + swing * np.sin(angle), swing * frequency * np.cos(angle), -swing * frequency**2 * np.sin(angle)
+
+
+def vehicle_motion(t: Array) -> tuple[Array, Array, BaseMotion]:
+    """Pose of frame 1 in the ground, R (n, 3, 3) and p (n, 3), and its motion: rocking about an axis that rocks itself."""
+    first, second = np.array([2.0, -1.0, 2.0]) / 3.0, np.array([0.6, 0.8, 0.0])
+    f, f1, f2 = 0.8 * np.sin(1.3 * t), 1.04 * np.cos(1.3 * t), -1.352 * np.sin(1.3 * t)
+    g, g1, g2 = (x[:, None] * second for x in (0.5 * np.cos(0.9 * t), -0.45 * np.sin(0.9 * t), -0.405 * np.cos(0.9 * t)))
+    outer = Rotation.from_rotvec(f[:, None] * first)
+    R = outer * Rotation.from_rotvec(g)
+    turned, spin = outer.apply(g1), f1[:, None] * first
+    omega = spin + turned
+    omega_rate = f2[:, None] * first + np.cross(spin, turned) + outer.apply(g2)
+    wave = np.array([1.0, 0.7, 0.4]) * t[:, None] + [0.0, 0.9, 2.1]
+    into = R.inv()
+    base = BaseMotion.of(
+        velocity=into.apply(np.array([1.0, 0.7, 0.4]) * np.cos(wave)),
+        angular_velocity=into.apply(omega),
+        acceleration=into.apply(-np.array([1.0, 0.49, 0.16]) * np.sin(wave)),
+        angular_acceleration=into.apply(omega_rate),
+        up=into.apply(UP),
+    )
+    return R.as_matrix(), np.sin(wave), base
+
+
+@LOOPS
+def test_frame_motion_is_the_derivative_of_the_poses_on_the_ground(loop):
+    times = np.linspace(0.0, 6.0, 25)
+
+    def on_ground(s: float) -> tuple[Array, Array, FrameMotion]:
+        """Position and rotation (n, 11, ...) of every frame, and its motion along frame 1."""
+        q, qd, qdd = joint_motion(times + s)
+        R, p, base = vehicle_motion(times + s)
+        motion = frame_motion(BOOM, q, qd, qdd, loop, base)
+        R = R[:, None]
+        return p[:, None] + (R @ motion.T[..., :3, 3:])[..., 0], R @ motion.T[..., :3, :3], motion
+
+    def along_ground(part: str, s: float = 0.0) -> Array:
+        return np.einsum("nij,nfj->nfi", vehicle_motion(times + s)[0], getattr(on_ground(s)[2], part))
+
+    R, dR = on_ground(0.0)[1], derivative(lambda s: on_ground(s)[1], h=3e-3)
+    for part, rate in (
+        ("velocity", derivative(lambda s: on_ground(s)[0], h=3e-3)),
+        ("angular_velocity", turning(R, dR)),
+        ("acceleration", derivative(lambda s: along_ground("velocity", s), h=3e-3)),
+        ("angular_acceleration", derivative(lambda s: along_ground("angular_velocity", s), h=3e-3)),
+    ):
+        assert_equal(along_ground(part), rate, tolerance=3e-12)
+
+
+def test_bodies_move_as_in_mujoco():
+    boom, rng = BOOMS["generic"], np.random.default_rng(15)
+    states, base = random_states(boom, 50, rng), random_base(rng, 50)
+    motions, expected = body_motion(boom, *states, base), mujoco_motion(boom, *states, base)
+    assert set(motions) == {*boom.bodies, "payload"}
+    for name, body in expected.items():
+        assert_equal(motions[name].com, body.com, tolerance=1e-14)
+        for part in MOTIONS:
+            assert_equal(getattr(motions[name], part), getattr(body, part), tolerance=1e-13)
+
+
+def test_bodies_are_placed_where_their_transforms_are():
+    q = positions(20, 16)
+    poses, motions = body_transforms(BOOM, q), body_motion(BOOM, q, np.zeros(5), np.zeros(5))
+    poses["payload"] = poses.pop("tip")
+    for name, T in poses.items():
+        np.testing.assert_array_equal(motions[name].T, T)
 
 
 @pytest.mark.parametrize("shape", [(), (5,), (3, 5), (2, 3, 5), (0,)])
@@ -156,15 +323,63 @@ def test_batches_are_their_states_one_by_one(shape):
         ((3,), lambda q: forward_kinematics(BOOM, q).position),
         ((3, 3), lambda q: forward_kinematics(BOOM, q).rotation),
         ((), lambda q: forward_kinematics(BOOM, q).pitch),
+        ((), transmission_angle),
     ):
         expected = np.reshape([function(one) for one in q], (*shape, *last))
         np.testing.assert_array_equal(function(q.reshape(*shape, 5)), expected, strict=True)
 
 
+@pytest.mark.parametrize("shape", [(), (5,), (3, 5), (2, 3, 5), (0,)])
+@pytest.mark.parametrize("moving", ["still", "constant", "varying"])
+def test_batches_of_motions_are_their_states_one_by_one(shape, moving):
+    rng = np.random.default_rng(17)
+    count = int(np.prod(shape))
+    states = random_states(BOOM, count, rng)
+    base = None if moving == "still" else random_base(rng, *(() if moving == "constant" else shape))
+    at = [None] * count if base is None else instants(flat(base), count)
+    batch = [x.reshape(*shape, 5) for x in states]
+    for last, function in (
+        ((11, 3), lambda *state: frame_motion(BOOM, *state).acceleration),
+        ((3,), lambda q, qd, qdd, _, base: body_motion(BOOM, q, qd, qdd, base)["upper"].acceleration),
+        ((6, 5), lambda q, qd, *_: jacobian_rate(BOOM, q, qd)),
+        ((), lambda q, *_: manipulability(BOOM, q)),
+    ):
+        alone = [function(*state, "outer", now) for *state, now in zip(*states, at, strict=True)]
+        actual, expected = function(*batch, "outer", base), np.reshape(alone, (*shape, *last))
+        assert actual.shape == expected.shape
+        assert_equal(actual, expected, tolerance=1e-15)
+
+
+def flat(base: BaseMotion) -> BaseMotion:
+    """The samples of a base motion in one row."""
+    return BaseMotion(*(np.reshape(getattr(base, field.name), (-1, 3)) for field in fields(base)))
+
+
+@pytest.mark.parametrize("given", [field.name for field in fields(BaseMotion) if field.name != "up"])
+@pytest.mark.parametrize("shape", [(2, 3), (1, 3, 3)])
+def test_a_base_that_does_not_match_the_states_is_named(given, shape):
+    base = BaseMotion.of(**{given: np.ones(shape)})
+    with pytest.raises(InputError, match=r"base .*does not match states of shape \(3, 5\)"):
+        frame_motion(BOOM, np.zeros((3, 5)), np.zeros(5), np.zeros(5), "inner", base)
+
+
 @pytest.mark.parametrize(
     "function",
-    [forward_kinematics, jacobian, body_transforms, lambda boom, q: frame_transforms(boom, q, "inner")],
-    ids=["forward_kinematics", "jacobian", "body_transforms", "frame_transforms"],
+    [
+        forward_kinematics,
+        jacobian,
+        manipulability,
+        body_transforms,
+        lambda boom, q: transmission_angle(q),
+        lambda boom, q: frame_transforms(boom, q, "inner"),
+        lambda boom, q: jacobian_rate(boom, q, np.zeros(5)),
+        lambda boom, q: frame_motion(boom, q, np.zeros(5), np.zeros(5), "inner"),
+        lambda boom, q: body_motion(boom, q, np.zeros(5), np.zeros(5)),
+    ],
+    ids=[
+        *("forward_kinematics", "jacobian", "manipulability", "body_transforms", "transmission_angle"),
+        *("frame_transforms", "jacobian_rate", "frame_motion", "body_motion"),
+    ],
 )
 def test_bad_positions_are_named(function):
     q = np.zeros((2, 5))

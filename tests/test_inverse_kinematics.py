@@ -10,17 +10,8 @@ from scipy.optimize import fsolve
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, Boom
 from boom_model.errors import InputError
-from boom_model.inverse_kinematics import (
-    ActuatorAngle,
-    ActuatorHorizontal,
-    Branches,
-    FixedExtension,
-    Hold,
-    Solution,
-    Solutions,
-    inverse_kinematics,
-    solve_branches,
-)
+from boom_model.holds import ActuatorAngle, ActuatorHorizontal, FixedExtension, Hold
+from boom_model.inverse_kinematics import Branches, Solution, Solutions, inverse_kinematics, solve_branches
 from boom_model.kinematics import forward_kinematics
 from tests.oracles import random_states
 

@@ -57,7 +57,7 @@ def test_report_is_made_on_a_grid_ten_times_finer_than_the_samples():
 
 def test_every_assumed_figure_is_in_the_report():
     report = plan(BOOM, "transport", "phenotyping", profile="jerk-limited").report
-    assert len(report.assumptions) == 5 * 3 + 2 * 2
+    assert len(report.assumptions) == 5 * 3 + 2 * 3 + 1
     for expected in (
         "yaw velocity limit 30 deg/s",
         "extension jerk limit 0.6 m/s^3",

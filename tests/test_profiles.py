@@ -18,7 +18,7 @@ SLACK = 1.001
 
 def worst_ratios(move):
     """Largest |demand| / limit of velocity, acceleration and drive torque, recomputed at half a millisecond."""
-    boom, fine = move.boom, sample(move.motion, 0.0005)
+    boom, fine = move.boom, sample(move.motions[0], 0.0005)
     tau = inverse_dynamics(boom, fine.q, fine.qd, fine.qdd, reactions=False).tau
     for i, drive in enumerate(boom.drives):
         if drive is not None:
@@ -84,7 +84,7 @@ def test_random_moves_keep_every_limit(profile):
     for start, goal in random_pairs(40):
         move = plan(BOOM, start, goal, profile=profile)
         assert max(worst_ratios(move).values()) <= SLACK
-        fine = sample(move.motion, 0.002)
+        fine = sample(move.motions[0], 0.002)
         assert LIMITS.hold(fine.q).all()
         np.testing.assert_allclose(fine.q[[0, -1]], [start, goal], rtol=0, atol=1e-14)
         np.testing.assert_allclose(fine.qd[[0, -1]], 0.0, atol=1e-9)

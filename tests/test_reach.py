@@ -8,7 +8,8 @@ import pytest
 from boom_model.arrays import Array
 from boom_model.boom import LIMIT_TOLERANCE, Boom
 from boom_model.errors import InputError
-from boom_model.inverse_kinematics import ActuatorAngle, ActuatorHorizontal, FixedExtension, Hold, solve_branches
+from boom_model.holds import ActuatorAngle, ActuatorHorizontal, FixedExtension, Hold
+from boom_model.inverse_kinematics import solve_branches
 from boom_model.kinematics import forward_kinematics
 from boom_model.reach import nearest_reachable
 

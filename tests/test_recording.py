@@ -23,6 +23,7 @@ from boom_model.kinematics import forward_kinematics
 from boom_model.provenance import Basis, Origin
 from planner.planning import Move, plan
 from planner.recording import write_recording
+from planner.vehicle import base_pose, load_case
 
 BOOM = Boom.load()
 FLOAT32 = 5e-7  # of positions up to 3 m and of rotations, once rounded to float32
@@ -31,7 +32,7 @@ NAMES = {"q": "position", "qd": "velocity", "qdd": "acceleration"}
 
 
 def write(path: Path, move: Move) -> None:
-    write_recording(path, move.boom, move.trajectory, move.loads, move.report)
+    write_recording(path, move)
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,35 @@ def test_rerun_verifies_the_file(which: str, request: pytest.FixtureRequest):
     assert "1 file verified without error" in done.stdout + done.stderr
 
 
+def test_boom_rides_on_the_vehicle(tmp_path: Path, recorded: Recorded):
+    case = load_case("ditch")
+    ridden = Recorded(tmp_path / "ditch.rrd", plan(BOOM, "transport", "phenotyping", step=0.1, vehicle=case))
+    write(ridden.path, ridden.move)
+    np.testing.assert_allclose(ridden.poses("/world/mount"), base_pose(case, ridden.move.trajectory.t), rtol=0, atol=FLOAT32)
+    for recording in (ridden, recorded):
+        assert recording.rows("/world/mount", "Transform3D:parent_frame")[0] == ["tf#/world"]
+        assert recording.rows("/world/mount", "Transform3D:child_frame")[0] == ["mount"]
+    np.testing.assert_array_equal(recorded.rows("/world/mount", "Transform3D:translation"), [[[0.0, 0.0, 0.0]]])
+    assert recorded.static("/world/tip_path", "CoordinateFrame:frame") == ["mount"]
+
+
 # The plots
+
+
+@pytest.mark.parametrize("i", range(5), ids=JOINTS)
+def test_torque_parts_are_there_with_their_sum(recorded: Recorded, i: int):
+    parts = recorded.move.parts
+    names = ["gravity", "inertia", "velocity", "payload", "friction", "vehicle"]
+    expected = np.stack([*(getattr(parts, name)[:, i] for name in names), parts.total[:, i]], axis=-1)
+    entity = f"/plots/parts/{JOINTS[i]}"
+    np.testing.assert_array_equal(recorded.scalars(entity), expected)
+    assert recorded.static(entity, "SeriesLines:names") == [*names, "total"]
+    np.testing.assert_allclose(expected[:, -1], recorded.move.loads.tau[:, i], rtol=0, atol=1e-12)
+
+
+def test_mount_wrench_is_there(recorded: Recorded):
+    for kind, columns in (("force", slice(0, 3)), ("moment", slice(3, 6))):
+        np.testing.assert_array_equal(recorded.scalars(f"/plots/mount/{kind}"), recorded.move.loads.mount[:, columns])
 
 
 @pytest.mark.parametrize("which", ["recorded", "standing"])
@@ -202,7 +231,7 @@ def test_frames_are_those_of_the_model(which: str, request: pytest.FixtureReques
         np.testing.assert_allclose(recording.poses(entity), T, rtol=0, atol=FLOAT32)
         np.testing.assert_array_equal(recording.times(entity), np.rint(trajectory.t * 1e9).astype(np.int64))
         assert recording.rows(entity, "Transform3D:child_frame") == [[name]] * len(T)
-        assert recording.rows(entity, "Transform3D:parent_frame") == [["tf#/world"]] * len(T)
+        assert recording.rows(entity, "Transform3D:parent_frame") == [["mount"]] * len(T)
 
 
 def test_solids_hang_from_their_own_frames(recorded: Recorded):
@@ -299,16 +328,17 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
     shown = blueprint(recording)
     origins = [row[0] for row in shown["ViewBlueprint:space_origin"]]
     plots = {e for e in recording.entities() if e.startswith("/plots/") and not e.endswith("/limits")}
-    assert len(plots) == 4 * 5 + 1
+    assert len(plots) == 4 * 5 + 1 + 5 + 2
     assert sorted(origins) == sorted(plots | {"/world", "/report"})
     classes = [row[0] for row in shown["ViewBlueprint:class_identifier"]]
     assert sorted(set(classes)) == ["3D", "TextDocument", "TimeSeries"]
     names = dict(zip(origins, (row[0] for row in shown["ViewBlueprint:display_name"]), strict=True))
     style = "SeriesLines" if which == "recorded" else "SeriesPoints"  # no line goes through one sample
     for plot in plots:
-        assert [names[plot]] == recording.static(plot, f"{style}:names")
+        curves = recording.static(plot, f"{style}:names")
+        assert names[plot] == curves[0] if len(curves) == 1 else "[N" in names[plot]
     tabs = {row[0] for row in shown["ContainerBlueprint:display_name"]}
-    assert tabs == {"Positions", "Velocities", "Accelerations", "Torques"}
+    assert tabs == {"Positions", "Velocities", "Accelerations", "Torques", "Torque parts", "Mount"}
     assert shown["TimePanelBlueprint:timeline"] == [["t"]]
 
 

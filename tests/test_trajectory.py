@@ -18,8 +18,8 @@ def lines_of(trajectory: Trajectory, tmp_path, columns=COLUMNS) -> list[str]:
 
 
 def test_samples_are_evenly_spaced_and_end_with_the_move():
-    trajectory = sample(MOVE.motion, 0.3)
-    assert trajectory.t[-1] == pytest.approx(MOVE.motion.duration, rel=1e-15)
+    trajectory = sample(MOVE.motions[0], 0.3)
+    assert trajectory.t[-1] == pytest.approx(MOVE.motions[0].duration, rel=1e-15)
     assert np.ptp(np.diff(trajectory.t)) < 1e-14
     assert np.diff(trajectory.t).max() <= 0.3
     assert not trajectory.q.flags.writeable
@@ -28,7 +28,7 @@ def test_samples_are_evenly_spaced_and_end_with_the_move():
 @pytest.mark.parametrize("step", [0.0, -1.0, np.nan])
 def test_bad_step_is_refused(step):
     with pytest.raises(InputError, match="step"):
-        sample(MOVE.motion, step)
+        sample(MOVE.motions[0], step)
 
 
 def test_csv_brings_back_every_bit(tmp_path):

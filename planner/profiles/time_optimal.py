@@ -12,7 +12,7 @@ from toppra.constraint import DiscretizationType, LinearConstraint
 from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
 from toppra.interpolator import AbstractGeometricPath
 
-from boom_model import Boom
+from boom_model import BaseMotion, Boom
 from boom_model.arrays import Array
 from boom_model.drives import drive_torque_tangent
 from planner.constraints import PathDynamics, drive_limits, explain_infeasible, path_dynamics
@@ -25,7 +25,7 @@ _SOLVES = 20
 _CONVERGED = 1e-5  # relative gain of a solve, below which the next is not worth its time
 
 
-def time_optimal(boom: Boom, path: Path, intervals: int = GRID_INTERVALS) -> TimeLaw:
+def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, intervals: int = GRID_INTERVALS) -> TimeLaw:
     """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
 
     The path acceleration is constant over each of the `intervals` equal steps in s, and the conditions hold at both ends of
@@ -40,10 +40,10 @@ def time_optimal(boom: Boom, path: Path, intervals: int = GRID_INTERVALS) -> Tim
             names the joint, the place, the demand and the limit.
     """
     s = np.linspace(0.0, 1.0, intervals + 1)
-    demands = path_dynamics(boom, path, s)
+    demands = path_dynamics(boom, path, s, base)
     if (demands.static_ratio > 1.0).any():  # a swing might carry the load past such a place, but could not stop at it
         raise explain_infeasible(demands)
-    unit = cubic(boom, path).duration  # solved in units of the cubic's duration, where s' and s'' are of order one
+    unit = cubic(boom, path, base).duration  # solved in units of the cubic's duration, where s' and s'' are of order one
     best, duration, x = None, np.inf, np.zeros_like(s)
     for _ in range(_SOLVES):
         speed = _solve(_Condition(_rows(demands, x), demands.x_max, unit), path, s)
