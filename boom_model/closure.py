@@ -32,25 +32,23 @@ class Closure(NamedTuple):
 def closed_by_extension(boom: Boom, rho: Array, F: Array, G: Array, root: Array | float) -> Closure:
     """For an extension, rho = L7 + theta4; root is +1 or -1. All broadcast."""
     g = boom.geometry
-    with np.errstate(over="ignore", invalid="ignore"):  # an absurdly far target is out of reach, not an error
-        d, e = 2.0 * (rho * G - F * g.L6), 2.0 * (rho * F + G * g.L6)
-        f = g.L9**2 - F**2 - G**2 - g.L6**2 - rho**2
-        amplitude = np.hypot(d, e)
-        room, scale = amplitude - np.abs(f), g.L9**2 + F**2 + G**2 + g.L6**2 + rho**2
-        ratio = np.divide(f, amplitude, out=np.zeros_like(f), where=amplitude > 0.0)
-        theta3 = np.arctan2(d, e) + root * np.arccos(np.clip(ratio, -1.0, 1.0))
-        return _closure(boom, theta3, rho, F, G, room, scale, amplitude > 0.0, root)
+    d, e = 2.0 * (rho * G - F * g.L6), 2.0 * (rho * F + G * g.L6)
+    f = g.L9**2 - F**2 - G**2 - g.L6**2 - rho**2
+    amplitude = np.hypot(d, e)
+    room, scale = amplitude - np.abs(f), g.L9**2 + F**2 + G**2 + g.L6**2 + rho**2
+    ratio = np.divide(f, amplitude, out=np.zeros_like(f), where=amplitude > 0.0)
+    theta3 = np.arctan2(d, e) + root * np.arccos(np.clip(ratio, -1.0, 1.0))
+    return _closure(boom, theta3, rho, F, G, room, scale, amplitude > 0.0, root)
 
 
 def closed_by_angle(boom: Boom, theta3: Array, F: Array, G: Array, root: Array | float) -> Closure:
     """For an actuator's angle theta3; root is +1 or -1. All broadcast."""
     g = boom.geometry
-    with np.errstate(over="ignore", invalid="ignore"):
-        c3, s3 = np.cos(theta3), np.sin(theta3)
-        half_b = F * c3 + G * s3
-        room = g.L9**2 - (G * c3 - F * s3 + g.L6) ** 2  # half_b^2 - c, without the squares that cancel in it
-        rho = -half_b + root * np.sqrt(np.maximum(room, 0.0))
-        return _closure(boom, theta3, rho, F, G, room, np.full_like(room, g.L9**2), np.isfinite(rho), root)
+    c3, s3 = np.cos(theta3), np.sin(theta3)
+    half_b = F * c3 + G * s3
+    room = g.L9**2 - (G * c3 - F * s3 + g.L6) ** 2  # half_b^2 - c, without the squares that cancel in it
+    rho = -half_b + root * np.sqrt(np.maximum(room, 0.0))
+    return _closure(boom, theta3, rho, F, G, room, np.full_like(room, g.L9**2), np.isfinite(rho), root)
 
 
 def _closure(

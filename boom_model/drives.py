@@ -176,7 +176,8 @@ def motor_torque(drive: Drive, tau: ArrayLike, qd: ArrayLike, qdd: ArrayLike) ->
         braking or holding:    tau / N                           + (J_rotor + J_gear) N qdd
 
     The no-load torque is added to the efficiency's loss, the conservative reading of the sheet; friction earns no credit
-    while braking (our own derivation, in the manner of Harmonic Drive's selection pages). None where a figure is missing.
+    while braking (our own derivation, in the manner of Harmonic Drive's selection pages). About tau = 0 it jumps by T_noload.
+    None where a figure is missing.
     """
     gear, inertia = drive.gearbox, reflected_inertia(drive)
     if gear.efficiency is None or gear.no_load_input_torque is None or inertia is None:
@@ -194,21 +195,32 @@ def drive_inertia(drive: Drive) -> float:
     return (drive.gearbox.efficiency or 1.0) * (reflected_inertia(drive) or 0.0)
 
 
-def drive_torque_limit(drive: Drive, speed: ArrayLike) -> Array | None:
-    """Joint torque [Nm] that a drive allows at a joint speed [rad/s], shape of `speed`; None where no figure limits it.
+def motor_limit(drive: Drive, speed: ArrayLike) -> Array | None:
+    """Joint torque [Nm] that the motor drives at a joint speed [rad/s], shape of `speed`; None where a figure is missing.
 
-        min(T_start_stop, (T_available(N speed) / (1 + margin) - T_noload) N eta)
+        (T_available(N speed) / (1 + margin) - T_noload) N eta
 
-    bounds |tau + eta N^2 (J_rotor + J_gear) qdd|. Without voltage or wiring the running torque stands for the curve: then
-    the limit is necessary, not sufficient, above low speed.
+    bounds |tau + eta N^2 (J_rotor + J_gear) qdd|, friction being part of tau. Without voltage or wiring the running torque
+    stands for the curve: then the limit is necessary, not sufficient, above low speed.
     """
     gear, w = drive.gearbox, drive.gearbox.ratio * np.asarray(speed, dtype=float)
-    limits = [] if gear.start_stop_torque is None else [np.full_like(w, gear.start_stop_torque)]
     curve = available_torque(drive, w)
     motor = drive.motor.running_torque if curve is None else curve
-    if motor is not None and gear.efficiency is not None and gear.no_load_input_torque is not None:
-        spare = np.asarray(motor) / (1.0 + STEPPER_MARGIN) - gear.no_load_input_torque
-        limits.append(np.broadcast_to(np.maximum(spare, 0.0) * gear.ratio * gear.efficiency, w.shape))
+    if motor is None or gear.efficiency is None or gear.no_load_input_torque is None:
+        return None
+    spare = np.maximum(np.asarray(motor) / (1.0 + STEPPER_MARGIN) - gear.no_load_input_torque, 0.0)
+    limit: Array = np.broadcast_to(spare * gear.ratio * gear.efficiency, w.shape)
+    return limit
+
+
+def drive_torque_limit(drive: Drive, speed: ArrayLike) -> Array | None:
+    """Joint torque [Nm] that motor and gearbox allow at a joint speed [rad/s], at no acceleration; None without any figure.
+
+    The lesser of `motor_limit` and the gearbox's start-stop torque, which bounds |tau| alone: the rotor is before the gears.
+    """
+    limits = [] if (motor := motor_limit(drive, speed)) is None else [motor]
+    if drive.gearbox.start_stop_torque is not None:
+        limits.append(np.full(np.shape(speed), drive.gearbox.start_stop_torque))
     if not limits:
         return None
     limit: Array = np.min(limits, axis=0)
@@ -219,8 +231,8 @@ def drive_torque_tangent(drive: Drive, speed: ArrayLike) -> tuple[Array, Array] 
     """Intercept [Nm] and slope [Nm s^2/rad^2] of a line in the square of the joint speed, below the drive's torque curve.
 
     The motor's curve is a convex function of the speed squared beyond its corner, so its tangent at `speed` (or at the
-    corner, where that is faster) lies below it everywhere beyond, and with `drive_torque_limit` at rest as a second bound
-    it never allows more than the curve does. None without the figures that make a curve.
+    corner, where that is faster) lies below it everywhere beyond, and with `motor_limit` at rest as a second bound it never
+    allows more than the curve does. None without the figures that make a curve.
     """
     terms, gear = _curve_terms(drive), drive.gearbox
     running = drive.motor.running_torque

@@ -39,7 +39,7 @@ def velocity_torque(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
 
 
 def gravity_torque(boom: Boom, q: ArrayLike, *, base: BaseMotion | None = None) -> Array:
-    """g(q) (..., 5): torque that holds the boom still, on a base that rests or moves without turning the joints.
+    """g(q) (..., 5): torque that holds the joints still, against gravity and whatever `base` does besides.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -61,7 +61,7 @@ def forward_dynamics(
 
     Args:
         q, qd, tau: (..., 5); they broadcast.
-        base, friction, drive_inertia: as in `inverse_dynamics`.
+        base, friction, drive_inertia: as in `inverse_dynamics`. Coulomb friction is 0 at rest: it brakes, and does not stick.
 
     Raises:
         InputError: an input is not finite or of the wrong shape, or shapes do not match.

@@ -62,14 +62,14 @@ class LeastExtension:
 
 @dataclass(frozen=True)
 class NearestHorizontal:
-    """The actuator is as parallel to the ground as possible. Cost: |theta3 - pi| [rad]."""
+    """The actuator is as parallel to the ground as possible. Cost: |theta3 - pi| [rad]; less extension breaks a tie."""
 
     def __str__(self) -> str:
         return "nearest-horizontal"
 
     def cost(self, boom: Boom, q: Array) -> Array:
         """(...) of q (..., 5)."""
-        return np.abs(q[..., 2] - np.pi)
+        return np.abs(q[..., 2] - np.pi) + _TIE * q[..., 3]
 
 
 @dataclass(frozen=True)
@@ -142,6 +142,8 @@ class LargestMargin:
         excess: Array = np.max(boom.limits.excess(q) / np.array([*spans, spans[2]]), axis=-1)
         return excess
 
+
+_TIE = 1e-9  # [rad/m] above rounding, and below what anybody can measure
 
 ConstraintHold = ActuatorAngle | FixedExtension
 ChoiceHold = LeastExtension | NearestHorizontal | LeastTorque | NearestPose | LargestMargin

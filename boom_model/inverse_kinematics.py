@@ -82,13 +82,9 @@ def inverse_kinematics(
         raise InputError(f"position has shape {position.shape}; it must be (3,)")
     pitch = _free_pitch(boom, position, hold) if pitch is None else scalar("pitch", pitch)
     found = solve_branches(boom, position, pitch, hold)
-    free = float(np.hypot(position[0], position[1])) == 0.0
+    free = not position[:2].any()
     note = ("the target is on the yaw axis: yaw is free, 0 is chosen",) if free else ()
-    solutions = tuple(
-        Solution(read_only(q), bool(within), (*note, *boom.limits.reasons(q)))
-        for q, exists, within in zip(found.q, found.exists, found.within_limits, strict=True)
-        if exists
-    )
+    solutions = tuple(_solution(boom, q, note) for q in found.q[found.exists])
     return Solutions(solutions, _best(boom, solutions, hold, reference), pitch)
 
 
@@ -126,9 +122,17 @@ def inverse_kinematics_of_pose(
         )
     pitch = float(np.arctan2(R[2, 0], R[0, 0] * np.cos(yaw) + R[1, 0] * np.sin(yaw)))
     hold = ActuatorHorizontal() if hold is None else hold
-    every = inverse_kinematics(boom, position, pitch, hold, reference).solutions
-    facing = tuple(s for s in every if np.cos(s.q[0] - yaw) > 0.0)  # the base turned round faces the other way
-    return Solutions(facing, _best(boom, facing, hold, reference), pitch)
+    ahead = float(position[0] * np.cos(yaw) + position[1] * np.sin(yaw))  # in the arm's plane; negative behind the base
+    found = solve_branches(boom, (abs(ahead), 0.0, position[2]), pitch, hold)
+    side = slice(0, len(found.q) // 2) if ahead >= 0.0 else slice(len(found.q) // 2, None)
+    q = found.q[side][found.exists[side]]
+    q[:, 0] = yaw
+    solutions = tuple(_solution(boom, branch) for branch in turned_into_limits(boom, q))
+    return Solutions(solutions, _best(boom, solutions, hold, reference), pitch)
+
+
+def _solution(boom: Boom, q: Array, note: tuple[str, ...] = ()) -> Solution:
+    return Solution(read_only(q), bool(boom.limits.hold(q)), (*note, *boom.limits.reasons(q)))
 
 
 def _free_pitch(boom: Boom, position: Array, hold: Hold) -> float:
@@ -175,6 +179,11 @@ def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, hold: Hold
         x, y, z, pitch = np.broadcast_arrays(*np.moveaxis(position, -1, 0), pitch)
     except ValueError:
         raise InputError(f"shapes do not match: position {position.shape}, pitch {pitch.shape}") from None
+    with np.errstate(over="ignore", invalid="ignore"):  # an absurdly far target is out of reach, not an error
+        return _branches(boom, x, y, z, pitch, hold)
+
+
+def _branches(boom: Boom, x: Array, y: Array, z: Array, pitch: Array, hold: Hold) -> Branches:
     side = np.array([1.0, -1.0])
     g, radius = boom.geometry, np.hypot(x, y)[..., None]
     targets = Targets(

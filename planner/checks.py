@@ -69,7 +69,8 @@ def check_rows(
     *,
     base: BaseMotion | None = None,
     payload_as: PayloadAs = "mass",
-    shock: bool = False,
+    shock: "Shock | None" = None,
+    bases: tuple[Basis, ...] = (),
 ) -> tuple[Row, ...]:
     """Every check of a motion: positions, speeds, accelerations and jerk, then each joint's drive, then the mount.
 
@@ -77,7 +78,8 @@ def check_rows(
         loads: the motion's own, from `inverse_dynamics`, with its reactions.
         base: how the vehicle moves the base; the static torques take its tilt.
         payload_as: how the loads took the payload; the static torques take it alike.
-        shock: whether the vehicle's motion has a shock, which the gearbox may meet up to its momentary peak torque.
+        shock: the vehicle's, which a gearbox may meet up to its momentary peak torque; None without one.
+        bases: how far the data behind the torques themselves can be trusted, the vehicle's for example.
     """
     still = np.zeros_like(trajectory.q)
     tilt = None if base is None else BaseMotion.of(up=base.up)
@@ -87,7 +89,19 @@ def check_rows(
         rows += _position_rows(boom, trajectory, i)
         rows += _rate_rows(boom, trajectory, i)
     for i, drive in enumerate(boom.drives):
-        view = _JointView(JOINTS[i], IS_LENGTH[i], trajectory, loads.tau[:, i], static[:, i], i)
+        friction, origin = boom.friction, boom.friction.origins[i]
+        view = _JointView(
+            joint=JOINTS[i],
+            is_length=IS_LENGTH[i],
+            trajectory=trajectory,
+            tau=loads.tau[:, i],
+            calm=loads.tau[:, i] if shock is None else shock.calm[:, i],
+            friction=friction.viscous[i] * trajectory.qd[:, i] + friction.coulomb[i] * np.sign(trajectory.qd[:, i]),
+            static=static[:, i],
+            index=i,
+            basis=Basis.weakest([*bases, *([] if origin is None else [origin.basis])]),
+            steady=base is None or base.up.ndim == 1 or bool(np.ptp(base.up, axis=0).max() == 0.0),
+        )
         rows += _undriven_rows(view) if drive is None else _driven_rows(view, drive, shock)
     rows += _mount_rows(boom, trajectory.t, loads)
     return tuple(rows)
@@ -102,6 +116,16 @@ def overall(rows: tuple[Row, ...]) -> Verdict:
 
 
 @dataclass(frozen=True, eq=False)
+class Shock:
+    """A shock of the vehicle during a motion."""
+
+    calm: Array
+    """(n, 5) the joint torques without it."""
+    resolved: bool
+    """Whether it lies inside the motion, with enough samples to see its peak."""
+
+
+@dataclass(frozen=True, eq=False)
 class _JointView:
     """One joint of a motion."""
 
@@ -109,8 +133,31 @@ class _JointView:
     is_length: bool
     trajectory: Trajectory
     tau: Array
+    calm: Array
+    """tau without the vehicle's shock"""
+    friction: Array
+    """what friction has in tau"""
     static: Array
     index: int
+    basis: Basis
+    """of the torques themselves"""
+    steady: bool
+    """whether the base rests or is tilted at most, so that the motion can be run backwards"""
+
+    def held(
+        self,
+        check: str,
+        demand: float,
+        limit: float | None,
+        unit: str,
+        at: float | None,
+        origin: Origin,
+        required: float = 0.0,
+        warn_near: bool = False,
+    ) -> Row:
+        """`_held` for a torque: no better founded than the torque itself."""
+        origin = Origin(Basis.weakest([origin.basis, self.basis]), origin.source)
+        return _held(self.joint, check, demand, limit, unit, at, origin, required, warn_near)
 
     @property
     def qd(self) -> Array:
@@ -138,7 +185,7 @@ def _held(
     margin = (limit - demand) / demand if demand > 0.0 else None
     if margin is None or margin >= required + (ESTIMATE_WARNING if warn_near else 0.0):
         verdict = Verdict.PASS
-    elif margin < required - SAMPLING_SLACK:
+    elif not margin >= required - SAMPLING_SLACK:
         verdict = Verdict.FAIL
     else:
         verdict = Verdict.WARN if warn_near else Verdict.PASS
@@ -213,47 +260,40 @@ def _undriven_rows(view: _JointView) -> Iterator[Row]:
         ("drive worst hold", view.static, torque),
     ):
         at = int(np.argmax(np.abs(values)))
-        yield _held(view.joint, check, float(abs(values[at])), None, unit, float(t[at]), origin)
+        yield view.held(check, float(abs(values[at])), None, unit, float(t[at]), origin)
     rms = _time_mean(t, view.tau**2) ** 0.5
-    yield _held(view.joint, f"drive RMS {force}", rms, None, torque, None, origin)
+    yield view.held(f"drive RMS {force}", rms, None, torque, None, origin)
 
 
-def _driven_rows(view: _JointView, drive: Drive, shock: bool) -> Iterator[Row]:
+def _driven_rows(view: _JointView, drive: Drive, shock: Shock | None) -> Iterator[Row]:
     yield from _gearbox_rows(view, drive, shock)
     yield from _motor_rows(view, drive)
     yield _power_off_row(view, drive)
 
 
-def _gearbox_rows(view: _JointView, drive: Drive, shock: bool) -> Iterator[Row]:
+def _gearbox_rows(view: _JointView, drive: Drive, shock: Shock | None) -> Iterator[Row]:
     gear, t = drive.gearbox, view.trajectory.t
     printed = Origin(Basis.PRINTED, f"{gear.source}; {_PROCEDURE}")
-    at = int(np.argmax(np.abs(view.tau)))
-    if shock:
-        peak = float(abs(view.tau[at]))
-        yield _held(view.joint, "gearbox momentary peak", peak, gear.peak_torque, "Nm", float(t[at]), printed)
-    yield _held(
-        view.joint,
-        "gearbox repeated peak",
-        float(abs(view.tau[at])),
-        gear.start_stop_torque,
-        "Nm",
-        float(t[at]),
-        printed,
-    )
-    average = average_torque(t, view.tau, view.qd)
+    if shock is not None:
+        at = int(np.argmax(np.abs(view.tau)))
+        unseen = Origin(Basis.PRINTED, "the shock is not inside the motion, or has too few samples to see its peak")
+        limit, origin = (gear.peak_torque, printed) if shock.resolved else (None, unseen)
+        yield view.held("gearbox momentary peak", float(abs(view.tau[at])), limit, "Nm", float(t[at]), origin)
+    at = int(np.argmax(np.abs(view.calm)))
+    yield view.held("gearbox repeated peak", float(abs(view.calm[at])), gear.start_stop_torque, "Nm", float(t[at]), printed)
+    average = average_torque(t, view.calm, view.qd)
     if average is not None:
-        yield _held(view.joint, "gearbox average", average, gear.max_average_torque, "Nm", None, printed)
+        yield view.held("gearbox average", average, gear.max_average_torque, "Nm", None, printed)
     at = int(np.argmax(np.abs(view.static)))
     derived = Origin(
         Basis.PRINTED, f"{gear.source}; held for ever at the worst pose, against the average rating [own derivation]"
     )
-    yield _held(view.joint, "gearbox hold", float(abs(view.static[at])), gear.max_average_torque, "Nm", float(t[at]), derived)
+    yield view.held("gearbox hold", float(abs(view.static[at])), gear.max_average_torque, "Nm", float(t[at]), derived)
     at = int(np.argmax(np.abs(view.qd)))
     speed = float(gear.ratio * abs(view.qd[at]))
     missing = "" if gear.max_input_speed else "; no input speed is printed"
     limit = gear.max_input_speed
-    yield _held(
-        view.joint,
+    yield view.held(
         "gearbox input speed",
         speed,
         limit,
@@ -292,8 +332,7 @@ def _mount_rows(boom: Boom, t: Array, loads: Loads) -> Iterator[Row]:
 def _motor_rows(view: _JointView, drive: Drive) -> Iterator[Row]:
     motor, gear, t = drive.motor, drive.gearbox, view.trajectory.t
     at = int(np.argmax(np.abs(view.static)))
-    yield _held(
-        view.joint,
+    yield view.held(
         "motor hold",
         float(abs(view.static[at]) / gear.ratio),
         motor.holding_torque,
@@ -303,15 +342,18 @@ def _motor_rows(view: _JointView, drive: Drive) -> Iterator[Row]:
         STEPPER_MARGIN,
     )
     demands = []
-    for check, direction in (("motor torque", 1.0), ("motor torque, reversed", -1.0)):
-        torque = motor_torque(drive, view.tau, direction * view.qd, view.qdd)
+    directions = [("motor torque", view.tau, view.qd)]
+    if view.steady:  # backwards, friction turns round and the rest stays
+        directions.append(("motor torque, reversed", view.tau - 2.0 * view.friction, -view.qd))
+    for check, tau, qd in directions:
+        torque = motor_torque(drive, tau, qd, view.qdd)
         if torque is None:
             why = f"{motor.source}; {gear.source}; efficiency, no-load torque or an inertia is not printed"
             yield Row(view.joint, check, None, None, "Nm", None, STEPPER_MARGIN, None, Verdict.NOT_CHECKABLE, None, why)
             return
         demands.append(np.abs(torque))
         yield _motor_torque_row(view, drive, check, demands[-1])
-    yield _motor_speed_row(view, drive, np.maximum(*demands))
+    yield _motor_speed_row(view, drive, np.max(demands, axis=0))
 
 
 def _motor_speed_row(view: _JointView, drive: Drive, torque: Array) -> Row:
@@ -326,9 +368,7 @@ def _motor_speed_row(view: _JointView, drive: Drive, torque: Array) -> Row:
         room = np.full_like(speed, np.inf)
         at = int(np.argmin(np.divide(highest, speed, out=room, where=speed > 0.0)))
         limit = float(highest[at]) if np.isfinite(highest[at]) else None
-    return _held(
-        view.joint, "motor speed", float(speed[at]), limit, "rad/s", float(view.trajectory.t[at]), origin, warn_near=True
-    )
+    return view.held("motor speed", float(speed[at]), limit, "rad/s", float(view.trajectory.t[at]), origin, warn_near=True)
 
 
 def _motor_torque_row(view: _JointView, drive: Drive, check: str, torque: Array) -> Row:
@@ -342,17 +382,17 @@ def _motor_torque_row(view: _JointView, drive: Drive, check: str, torque: Array)
         at = int(np.argmax(torque))
         short = running is not None and torque[at] * (1.0 + STEPPER_MARGIN - SAMPLING_SLACK) > running
         if short:  # no supply makes a motor stronger than its running torque
-            return _held(view.joint, check, float(torque[at]), running, "Nm", float(t[at]), slow, STEPPER_MARGIN)
+            return view.held(check, float(torque[at]), running, "Nm", float(t[at]), slow, STEPPER_MARGIN)
         unknown = Origin(Basis.PRINTED, f"{motor.source}; above low speed only with bus voltage and wiring")
-        return _held(view.joint, check, float(torque[at]), None, "Nm", float(t[at]), unknown, STEPPER_MARGIN)
+        return view.held(check, float(torque[at]), None, "Nm", float(t[at]), unknown, STEPPER_MARGIN)
     available = np.full_like(torque, running) if curve is None else curve
     with np.errstate(divide="ignore"):
         at = int(np.argmin(available / torque))
-    on_curve = curve is not None and speed[at] > LOW_SPEED
+    on_curve = available[at] < running * (1.0 - SAMPLING_SLACK)
     origin = _curve_origin(drive, "torque-speed curve") if on_curve else slow
-    return _held(
-        view.joint, check, float(torque[at]), float(available[at]), "Nm", float(t[at]), origin, STEPPER_MARGIN, on_curve
-    )
+    other = max(float(torque[at]) - (drive.gearbox.no_load_input_torque or 0.0), 0.0)
+    origin = Origin(origin.basis, f"{origin.source}; {other:.3f} Nm if the sheet's efficiency holds the no-load torque already")
+    return view.held(check, float(torque[at]), float(available[at]), "Nm", float(t[at]), origin, STEPPER_MARGIN, on_curve)
 
 
 def _curve_origin(drive: Drive, what: str) -> Origin:

@@ -55,6 +55,9 @@ def main() -> None:
     except click.ClickException as error:
         _complain(error.format_message())
         code = BAD_INPUT
+    except (MemoryError, OverflowError) as error:
+        _complain(f"too large to compute: {error}")
+        code = BAD_INPUT
     except click.Abort:
         code = 130
     except InfeasibleError as error:
@@ -123,12 +126,14 @@ def plan(
       boom plan transport tip=1.4,0,1.0 --hold extension=0.25 --profile time-optimal
       boom plan tip=1,1.7,0.9 tip=-1,1.7,0.9 --along line --profile jerk-limited
     """
+    from planner.files import check_writable
     from planner.planning import plan as plan_move
     from planner.trajectory import write_csv
     from planner.vehicle import load_case
 
     boom = _load(boom_file, payload)
     case = None if vehicle is None else load_case(vehicle)
+    check_writable(out, csv_file)
     try:
         move = plan_move(
             boom,
@@ -229,6 +234,8 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
     if not out.endswith((".png", ".rrd")):
         raise InputError(f"{out}: a reach map is written as .png or .rrd")
     boom, angle, held = _load(boom_file, payload), parse_pitch(pitch), parse_hold(hold)
+    if angle is None:
+        raise InputError("pitch free: a reach map is drawn for one pitch")
     found = reach_map(boom, held, angle)
     row, column = np.nonzero(found.within_limits)
     answer: dict[str, Any] = {
@@ -287,7 +294,7 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
 @boom_option
 @json_option
 def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
-    """Inverse dynamics of a motion: the torque of each joint at each sample.
+    """Inverse dynamics of a motion: the torque of each joint at each sample, with its friction where the boom's file gives it.
 
     IN.csv holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
 
@@ -295,11 +302,12 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
     Example:
       boom torque move.csv --out torques.csv --payload 8
     """
-    from boom_model import JOINTS, inverse_dynamics
+    from boom_model import JOINTS
+    from planner.planning import torques
     from planner.trajectory import read_csv, write_csv
 
     boom, trajectory = _load(boom_file, payload), read_csv(motion)
-    tau = inverse_dynamics(boom, trajectory.q, trajectory.qd, trajectory.qdd, payload_as=payload_as, reactions=False).tau
+    tau = torques(boom, trajectory, payload_as)
     write_csv(trajectory, out, tau)
     at = np.abs(tau).argmax(axis=0)
     peaks = [

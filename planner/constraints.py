@@ -4,8 +4,8 @@ On a path p(s), with u = s'' and x = s'^2, joint velocities are p' s', accelerat
 
     a u + b x + c,   c = tau(p, 0, 0),   a = tau(p, 0, p') - c,   b = tau(p, p', p'') - c,
 
-the torque being the one that the drive's output must give, its reflected inertia included. A drive's limit falls with its
-speed, that is with x.
+to which friction adds. The gearbox bears this torque; the motor accelerates its own inertia besides, and its limit falls with
+its speed, that is with x.
 """
 
 from dataclasses import dataclass
@@ -16,11 +16,12 @@ from numpy.typing import ArrayLike
 from boom_model import JOINTS, Boom, InfeasibleError, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array
 from boom_model.base_motion import BaseMotion
-from boom_model.drives import drive_inertia, drive_torque_limit
+from boom_model.drives import drive_inertia, motor_limit
 from planner.path import Path
 from planner.time_law import TimeLaw
 
 _LEAST_STRETCH_STEPS = 60
+_FINITE = 1e12
 
 
 class InfeasiblePathError(InfeasibleError):
@@ -43,41 +44,67 @@ class PathDynamics:
     p2: Array
     """(n, 5) p''"""
     a: Array
-    """(n, 5) torque per u, at the drive's output"""
+    """(n, 5) joint torque per u"""
     b: Array
-    """(n, 5) torque per x"""
+    """(n, 5) joint torque per x"""
     c: Array
     """(n, 5) static torque"""
+    friction: Array
+    """(n, 5) the most that the joints' friction adds, at the largest speed that the joint velocities allow"""
 
     @property
     def x_max(self) -> Array:
         """(n,) the bound that the joint velocities set on x."""
-        with np.errstate(divide="ignore"):
-            bound: Array = np.min((self.boom.limits.velocity / np.abs(self.p1)) ** 2, axis=-1)
-        return bound
+        return _largest_x(self.boom, self.p1)
+
+    @property
+    def rotors(self) -> Array:
+        """(5,) what the drives' own inertia adds to the motors' share, eta N^2 (J_rotor + J_gear)."""
+        return np.array([drive_inertia(drive) if drive else 0.0 for drive in self.boom.drives])
 
     def torque_ratio(self, u: Array, x: Array) -> Array:
-        """(n, 5) |torque| over the drive's limit at the joint's speed, at u and x (n,); 0 where no drive limits."""
-        torque = np.abs(self.a * u[:, None] + self.b * x[:, None] + self.c)
-        limit = drive_limits(self.boom, self.p1 * np.sqrt(x)[:, None])
-        return np.divide(torque, limit, out=np.full_like(torque, np.inf), where=limit > 0.0)
+        """(n, 5) the larger of gearbox and motor torque over their limits, at u and x (n,); 0 where no drive limits.
+
+        With friction and without: it may be less than the bound that is taken, and then helps less while braking.
+        """
+        u, x = u[:, None], x[:, None]
+        smooth = self.a * u + self.b * x + self.c
+        inertia = self.rotors * (self.p1 * u + self.p2 * x)
+        gears, motors = gear_limits(self.boom), motor_limits(self.boom, self.p1 * np.sqrt(x))
+        ratio = np.zeros_like(smooth)
+        for torque in (smooth, smooth + self.friction):
+            ratio = np.maximum(ratio, np.abs(torque) / gears)
+            driven = np.abs(torque + inertia)
+            ratio = np.maximum(ratio, np.divide(driven, motors, out=np.full_like(driven, np.inf), where=motors > 0.0))
+        return ratio
 
     @property
     def static_ratio(self) -> Array:
-        """(n, 5) `torque_ratio` of merely holding the load."""
-        still = np.zeros_like(self.s)
-        return self.torque_ratio(still, still)
+        """(n, 5) of merely holding the load, over what motor and gearbox allow at rest."""
+        held: Array = np.abs(self.c) / static_limits(self.boom)
+        return held
 
 
-def drive_limits(boom: Boom, speed: ArrayLike) -> Array:
-    """`drive_torque_limit` of every joint at joint speeds (..., 5), likewise shaped; infinite where no drive limits."""
+def gear_limits(boom: Boom) -> Array:
+    """(5,) start-stop torque of the gearboxes [Nm]; infinite where none is given."""
+    limits = [None if drive is None else drive.gearbox.start_stop_torque for drive in boom.drives]
+    return np.array([np.inf if limit is None else limit for limit in limits])
+
+
+def motor_limits(boom: Boom, speed: ArrayLike) -> Array:
+    """`motor_limit` of every joint at joint speeds (..., 5), likewise shaped; infinite where no motor limits."""
     speed = np.asarray(speed, dtype=float)
     limits = np.full_like(speed, np.inf)
     for i, drive in enumerate(boom.drives):
-        limit = None if drive is None else drive_torque_limit(drive, speed[..., i])
+        limit = None if drive is None else motor_limit(drive, speed[..., i])
         if limit is not None:
             limits[..., i] = limit
     return limits
+
+
+def static_limits(boom: Boom) -> Array:
+    """(5,) torque that motor and gearbox allow at rest [Nm]; infinite where no drive limits."""
+    return np.minimum(gear_limits(boom), motor_limits(boom, np.zeros(5)))
 
 
 def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = None) -> PathDynamics:
@@ -86,28 +113,34 @@ def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = No
     zero = np.zeros_like(p)
     states = [p, p, p], [zero, zero, p1], [zero, p1, p2]
     static, pushed, carried = inverse_dynamics(boom, *states, base=base, reactions=False).tau
-    inertia = np.array([drive_inertia(drive) if drive else 0.0 for drive in boom.drives])
-    a, b = pushed - static + inertia * p1, carried - static + inertia * p2
-    return PathDynamics(boom, path, s, p1, p2, a, b, static)
+    fastest = p1 * np.sqrt(np.minimum(_largest_x(boom, p1), _FINITE))[:, None]
+    friction = boom.friction.coulomb * np.sign(p1) + boom.friction.viscous * fastest
+    return PathDynamics(boom, path, s, p1, p2, pushed - static, carried - static, static, friction)
+
+
+def _largest_x(boom: Boom, p1: Array) -> Array:
+    with np.errstate(divide="ignore"):
+        bound: Array = np.min((boom.limits.velocity / np.abs(p1)) ** 2, axis=-1)
+    return bound
 
 
 def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None, samples: int = 2001) -> float:
     """The factor by which a law must be slowed (or may be hastened, below 1) to keep the limits along its path.
 
-    Slowed by k, a law's u and x fall as 1/k^2: the joint limits give k at once, the drives' by bisection above it. A load
-    that a drive cannot even hold is left out, because no slowness mends it.
+    Slowed by k, a law's u and x fall as 1/k^2: the joint limits give k at once, the drives' by bisection above it. Where a
+    drive cannot even hold the load somewhere no slowness mends the move, and the joint limits alone decide.
     """
     t = np.linspace(0.0, law.duration, samples)
     demands = path_dynamics(boom, path, np.clip(np.asarray(law.s(t)), 0.0, 1.0), base)
     x, u = np.asarray(law.s(t, 1)) ** 2, np.asarray(law.s(t, 2))
     acceleration = np.abs(demands.p1 * u[:, None] + demands.p2 * x[:, None]) / boom.limits.acceleration
     least = float(np.sqrt(max(acceleration.max(), (x / demands.x_max).max())))
-    mendable = demands.static_ratio < 1.0
+    at_rest = np.abs(demands.torque_ratio(np.zeros_like(u), np.zeros_like(x))).max()
 
     def kept(k: float) -> bool:
-        return bool((demands.torque_ratio(u / k**2, x / k**2)[mendable] <= 1.0).all())
+        return bool((demands.torque_ratio(u / k**2, x / k**2) <= 1.0).all())
 
-    if kept(least):
+    if at_rest >= 1.0 or kept(least):
         return least
     slow = 2.0 * least
     while not kept(slow):
@@ -124,7 +157,7 @@ def explain_infeasible(demands: PathDynamics) -> InfeasiblePathError:
     ratio = demands.static_ratio
     at, worst = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
     joint, s, demand = JOINTS[worst], float(demands.s[at]), float(abs(demands.c[at, worst]))
-    limit = float(drive_limits(demands.boom, np.zeros(5))[worst])
+    limit = float(static_limits(demands.boom)[worst])
     tip = ", ".join(f"{x:.3f}" for x in forward_kinematics(demands.boom, demands.path(s)).position)
     if demand > limit:
         why = f"joint {joint} needs {demand:.1f} Nm only to hold its load there, and its drive allows {limit:.1f} Nm"

@@ -9,6 +9,21 @@ from pathlib import Path
 from boom_model.errors import InputError
 
 
+def check_writable(*paths: str | Path | None) -> None:
+    """Whether files can be written there, one each, before the work that would fill them.
+
+    Raises:
+        InputError: as `replacing`, or two of them are the same file.
+    """
+    given = [os.path.realpath(path) for path in paths if path is not None]
+    for i, path in enumerate(given):
+        if path in given[:i]:
+            raise InputError(f"{path}: cannot be written: it is to hold two things")
+        handle, temporary = _beside(Path(path))
+        os.close(handle)
+        os.unlink(temporary)
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[str]:
     """A temporary name beside `path` to write to; moved onto `path` when the block ends well, removed when it does not.
@@ -16,17 +31,9 @@ def replacing(path: str | Path) -> Iterator[str]:
     Raises:
         InputError: the folder is missing or cannot be written to, or the disk refuses; an old file is left as it was.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path}: cannot be written: it is a folder")
-    try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
-        os.close(handle)
-        umask = os.umask(0)
-        os.umask(umask)
-        os.chmod(temporary, 0o666 & ~umask)  # mkstemp's own mode would hide the file from everyone else
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    path = Path(os.path.realpath(path))  # a link stays a link, and its target is replaced
+    handle, temporary = _beside(path)
+    os.close(handle)
     try:
         yield temporary
         os.replace(temporary, path)
@@ -35,3 +42,17 @@ def replacing(path: str | Path) -> Iterator[str]:
     finally:
         with suppress(FileNotFoundError):
             os.unlink(temporary)
+
+
+def _beside(path: Path) -> tuple[int, str]:
+    """An open temporary file in the folder of `path`, and its name."""
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: cannot be written: it is no regular file")
+    try:
+        handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(temporary, 0o666 & ~umask)  # mkstemp's own mode would hide the file from everyone else
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    return handle, temporary

@@ -164,7 +164,7 @@ def follow(
     planned = boom if isinstance(hold, ConstraintHold) else _inset(boom)
     for nodes in _NODES:
         s = np.linspace(0.0, 1.0, nodes + 1)
-        spline = make_interp_spline(s, _one_branch(planned, curve, pitch, hold, s, start), k=5)
+        spline = make_interp_spline(s, _one_branch(boom, planned, curve, pitch, hold, s, start), k=5)
         fine = np.linspace(0.0, 1.0, nodes * _CHECKS_PER_NODE + 1)
         q = spline(fine)
         deviation = float(np.linalg.norm(forward_kinematics(boom, q).position - curve(fine), axis=-1).max())
@@ -182,22 +182,31 @@ def _inset(boom: Boom) -> Boom:
     return replace(boom, limits=replace(boom.limits, lower=lower, upper=upper, linkage=boom.limits.linkage + 2.0 * _INSET[2]))
 
 
-def _one_branch(boom: Boom, curve: TipCurve, pitch: float, hold: Hold, s: Array, start: Array) -> Array:
-    """q (n, 5) at s (n,), each on the branch nearest to the one before."""
-    found = solve_branches(boom, curve(s), pitch, hold)
-    reached = np.asarray(found.within_limits.any(axis=-1))
-    if not reached.all():
-        raise InfeasibleError(_leaves(boom, curve, pitch, hold, s, reached))
+def _one_branch(boom: Boom, planned: Boom, curve: TipCurve, pitch: float, hold: Hold, s: Array, start: Array) -> Array:
+    """q (n, 5) at s (n,), each on the branch nearest to the one before: of all starts that go through, the nearest."""
+    found = solve_branches(planned, curve(s), pitch, hold)
+    if not found.within_limits.any(axis=-1).all():
+        truly = np.asarray(solve_branches(boom, curve(s), pitch, hold).within_limits.any(axis=-1))
+        if truly.all():  # beyond the limits as they are drawn in, by less than anybody could use
+            boom, truly = planned, np.asarray(found.within_limits.any(axis=-1))
+        raise InfeasibleError(_leaves(boom, curve, pitch, hold, s, truly))
     span = np.where(boom.limits.upper > boom.limits.lower, boom.limits.upper - boom.limits.lower, 1.0)
-    path, last = np.empty((len(s), 5)), start
-    for i, (q, allowed) in enumerate(zip(found.q, found.within_limits, strict=True)):
-        steps = np.where(allowed, np.abs((q - last) / span).max(axis=-1), np.inf)
-        best = int(np.argmin(steps))
-        if i > 0 and steps[best] > _FLIP:
-            at = ", ".join(f"{x:.4g}" for x in curve(s[i]))
-            raise InfeasibleError(f"the tip's line forces a flip to another branch under hold {hold} at {s[i]:.1%}, ({at}) m")
-        path[i] = last = q[best]
-    return path
+    starts = found.q[0][found.within_limits[0]]
+    starts = starts[np.argsort(np.abs((starts - start) / span).max(axis=-1))]
+    broken = 0
+    for first in starts:
+        path, last = np.empty((len(s), 5)), first
+        for i, (q, allowed) in enumerate(zip(found.q, found.within_limits, strict=True)):
+            steps = np.where(allowed, np.abs((q - last) / span).max(axis=-1), np.inf)
+            best = int(np.argmin(steps))
+            if steps[best] > _FLIP:
+                broken = max(broken, i)
+                break
+            path[i] = last = q[best]
+        else:
+            return path
+    at = ", ".join(f"{x:.4g}" for x in curve(s[broken]))
+    raise InfeasibleError(f"the tip's line forces a flip to another branch under hold {hold} at {s[broken]:.1%}, ({at}) m")
 
 
 def _leaves(boom: Boom, curve: TipCurve, pitch: float, hold: Hold, s: Array, reached: Mask) -> str:

@@ -1,7 +1,7 @@
 """The main job: from two targets to a motion that has been checked."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 from typing import Literal
@@ -24,7 +24,7 @@ from boom_model import (
 from boom_model.arrays import Array, checked
 from boom_model.dynamics import PayloadAs
 from boom_model.holds import Hold
-from planner.checks import check_rows
+from planner.checks import Shock, check_rows
 from planner.constraints import least_stretch
 from planner.path import JointLine, Path, TipArc, TipLine, TipPath, follow
 from planner.report import Report, assumptions, torque_peaks
@@ -35,6 +35,9 @@ from planner.vehicle import VehicleCase, base_motion
 
 CHECKS_PER_STEP = 10
 """A planned move is checked on a grid this many times finer than it is sampled."""
+
+SHOCK_SAMPLES = 20
+"""Samples that a shock must have for its peak to be seen, to 0.3 %."""
 
 _ROUNDING = 1e-9
 _CURVED_SAMPLES = 40_001
@@ -117,7 +120,10 @@ def plan(
     factor = _stretch(sum(law.duration for law in laws), profile, duration)
     motions = tuple(Motion(path, law.stretched(factor)) for path, law in zip(paths, laws, strict=True))
     notes = tuple(path.sentence for path in paths if isinstance(path, TipPath))
-    coarse, fine = (joined([sample(motion, each) for motion in motions], notes) for each in (step, step / CHECKS_PER_STEP))
+    finer = step / CHECKS_PER_STEP
+    if vehicle is not None and vehicle.peak != 0.0:
+        finer = min(finer, vehicle.shock_duration / (2 * SHOCK_SAMPLES))
+    coarse, fine = (joined([sample(motion, each) for motion in motions], notes) for each in (step, finer))
     return _move(boom, profile, vehicle, coarse, fine, motions)
 
 
@@ -168,19 +174,62 @@ def check(
         vehicle: what the vehicle does meanwhile; None rests on level ground.
         profile: what the report calls the motion.
     """
-    base = None if vehicle is None else base_motion(vehicle, trajectory.t)
-    states = (trajectory.q, trajectory.qd, trajectory.qdd)
-    loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True)
-    parts = breakdown(boom, *states, base=base, payload_as=payload_as, friction=True)
-    shock = vehicle is not None and vehicle.peak != 0.0
+    loads, parts, base = _loads(boom, trajectory, vehicle, payload_as)
+    shock = None if vehicle is None or vehicle.peak == 0.0 else _shock(boom, trajectory, vehicle, payload_as)
     return Report(
         profile=str(profile),
         duration=trajectory.duration,
-        rows=check_rows(boom, trajectory, loads, base=base, payload_as=payload_as, shock=shock),
+        rows=check_rows(
+            boom,
+            trajectory,
+            loads,
+            base=base,
+            payload_as=payload_as,
+            shock=shock,
+            bases=() if vehicle is None else (vehicle.origin.basis,),
+        ),
         notes=(*trajectory.notes, *_vehicle_notes(vehicle)),
         assumptions=assumptions(boom, trajectory.qddd is not None),
         peaks=torque_peaks(trajectory.t, parts),
     )
+
+
+def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass") -> Array:
+    """Joint torques (n, 5) of a motion on level ground, with the joints' friction where it is known.
+
+    Raises:
+        InputError: as `inverse_dynamics`, or a torque is not finite.
+    """
+    return _loads(boom, trajectory, None, payload_as)[0].tau
+
+
+def _loads(
+    boom: Boom, trajectory: Trajectory, vehicle: VehicleCase | None, payload_as: PayloadAs = "mass"
+) -> tuple[Loads, Breakdown, BaseMotion | None]:
+    """Loads with friction, their breakdown, and the base's motion.
+
+    Raises:
+        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+    """
+    base = None if vehicle is None else base_motion(vehicle, trajectory.t)
+    states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    with np.errstate(over="ignore", invalid="ignore"):
+        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True)
+        finite = np.isfinite(loads.tau).all(axis=-1)
+        if not finite.all():
+            at = int(np.argmin(finite))
+            raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
+        parts = breakdown(boom, *states, base=base, payload_as=payload_as, friction=True)
+    return loads, parts, base
+
+
+def _shock(boom: Boom, trajectory: Trajectory, vehicle: VehicleCase, payload_as: PayloadAs) -> Shock:
+    """What the joints bear without the shock, and whether the samples see it."""
+    calm, _, _ = _loads(boom, trajectory, replace(vehicle, peak=0.0), payload_as)
+    start, end = vehicle.shock_start, vehicle.shock_start + vehicle.shock_duration
+    inside = trajectory.t[0] <= start and end <= trajectory.t[-1]
+    samples = int(((trajectory.t >= start) & (trajectory.t <= end)).sum())
+    return Shock(calm.tau, inside and samples >= SHOCK_SAMPLES)
 
 
 def _move(
@@ -191,10 +240,7 @@ def _move(
     fine: Trajectory | None,
     motions: tuple[Motion, ...],
 ) -> Move:
-    base = None if vehicle is None else base_motion(vehicle, trajectory.t)
-    states = (trajectory.q, trajectory.qd, trajectory.qdd)
-    loads = inverse_dynamics(boom, *states, base=base, friction=True)
-    parts = breakdown(boom, *states, base=base, friction=True)
+    loads, parts, _ = _loads(boom, trajectory, vehicle)
     report = check(boom, trajectory if fine is None else fine, profile=profile, vehicle=vehicle)
     return Move(boom, profile, trajectory, loads, parts, report, motions, vehicle)
 

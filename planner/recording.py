@@ -272,7 +272,7 @@ class _Plot:
 
     @property
     def limit_titles(self) -> list[str]:
-        mark = " (assumed)" if self.basis is Basis.ASSUMED else ""
+        mark = "" if self.basis is Basis.PRINTED else f" ({self.basis})"
         return [f"{name} [{self.unit}]{mark}" for name in self.limits]
 
 
@@ -330,7 +330,7 @@ def _torque_plots(boom: Boom, trajectory: Trajectory, tau: Array) -> Iterator[_P
         if drive is not None and limit is not None:
             own = drive_inertia(drive) * trajectory.qdd[:, i]
             limits = {"drive's lower limit": -limit - own, "drive's upper limit": limit - own}
-        basis = Basis.weakest([] if drive is None else [origin.basis for origin in drive.supply_origins])
+        basis = Basis.weakest([Basis.ESTIMATED, *([] if drive is None else [o.basis for o in drive.supply_origins])])
         name, unit = ("force", "N") if IS_LENGTH[i] else ("torque", "Nm")
         yield _Plot(f"plots/tau/{joint}", f"{joint} {name}", unit, JOINT_COLORS[joint], tau[:, i], limits, basis)
 
@@ -376,11 +376,20 @@ def _bundles(move: Move) -> dict[str, list[_Bundle]]:
         colors = [*PART_COLORS.values(), PAYLOAD_COLOR]
         tabs["Torque parts"].append(_Bundle(f"plots/parts/{joint}", f"{joint} [{unit}]", names, colors, values))
     if move.loads.mount is not None:
-        axes = [COLORS["inner"], COLORS["upper"], COLORS["end_effector"]]
-        for kind, unit, columns in (("force", "N", slice(0, 3)), ("moment", "Nm", slice(3, 6))):
-            values = move.loads.mount[:, columns]
+        bearable = (move.boom.mount.force, move.boom.mount.moment)
+        for (kind, unit, columns), limit in zip(
+            (("force", "N", slice(0, 3)), ("moment", "Nm", slice(3, 6))), bearable, strict=True
+        ):
+            vectors = move.loads.mount[:, columns]
+            names, colors = ["x", "y", "z", "size"], [COLORS[b] for b in ("inner", "upper", "end_effector", "base")]
+            series = [*vectors.T, np.linalg.norm(vectors, axis=-1)]
+            if limit is not None:
+                names.append("limit" if limit.origin.basis is Basis.PRINTED else f"limit ({limit.origin.basis})")
+                colors.append(LIMIT_COLOR)
+                series.append(np.full(len(vectors), limit.value))
             title = f"{kind} on the mount [{unit}]"
-            tabs["Mount"].append(_Bundle(f"plots/mount/{kind}", title, [f"{a} [{unit}]" for a in "xyz"], axes, values))
+            curves = [f"{name} [{unit}]" for name in names]
+            tabs["Mount"].append(_Bundle(f"plots/mount/{kind}", title, curves, colors, np.stack(series, axis=-1)))
     return tabs
 
 

@@ -64,7 +64,7 @@ class Report:
         unknown = list(dict.fromkeys(r.joint for r in self.rows if r.verdict is Verdict.NOT_CHECKABLE))
         warned = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.WARN]
         parts = [f"failed: {', '.join(failed)}"] if failed else []
-        parts += [f"close to an estimated or assumed limit: {', '.join(warned)}"] if warned else []
+        parts += [f"passed only on estimated or assumed data: {', '.join(warned)}"] if warned else []
         parts += [f"not checkable for want of data: {', '.join(unknown)}"] if unknown else []
         return f"{self.verdict}: {'; '.join(parts) if parts else 'every check passed'}"
 
@@ -165,6 +165,17 @@ def assumptions(boom: Boom, jerk_limited: bool) -> tuple[str, ...]:
             sentences.append(f"{joint} wiring {wiring.value}: {wiring.origin.source}")
         if brake is not None and brake.origin.basis is Basis.ASSUMED:
             sentences.append(f"{joint} brake {'present' if brake.value else 'absent'}: {brake.origin.source}")
+    for joint, given in zip(JOINTS, boom.friction.origins, strict=True):
+        if given is not None and given.basis is Basis.ASSUMED:
+            sentences.append(f"{joint} friction: {given.source}")
+    for i, origin in enumerate(limits.origins["position"]):
+        if origin.basis is Basis.ASSUMED:
+            sentences.append(f"{JOINTS[i]} position limits: {origin.source}")
+    if limits.origins["linkage"][0].basis is Basis.ASSUMED:
+        sentences.append(f"coupled limit of the linkage: {limits.origins['linkage'][0].source}")
+    for name, bearable in (("force", boom.mount.force), ("moment", boom.mount.moment)):
+        if bearable is not None and bearable.origin.basis is Basis.ASSUMED:
+            sentences.append(f"{name} that the mount bears, {bearable.value:g}: {bearable.origin.source}")
     if limits.origins["transmission"][0].basis is Basis.ASSUMED:
         angle = np.degrees(limits.transmission)
         sentences.append(f"transmission angle warned of below {angle:g} deg: {limits.origins['transmission'][0].source}")

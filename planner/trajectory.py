@@ -15,6 +15,9 @@ from planner.time_law import Motion
 STEP = 0.01
 """Default sampling step [s], the thesis's (section 3.5)."""
 
+MOST_SAMPLES = 10_000_000
+"""Samples that a motion may have: a day at a controller's 100 Hz."""
+
 _QUANTITIES = ("q", "qd", "qdd")
 COLUMNS = ("t", *(f"{name}{i}" for name in _QUANTITIES for i in range(1, 6)))
 """Header of a motion's CSV, in SI."""
@@ -78,6 +81,8 @@ def sample(motion: Motion, step: float = STEP) -> Trajectory:
     """
     if not float(checked("step", step)) > 0.0:
         raise InputError(f"step is {step} s; it must be above 0 s")
+    if motion.duration / step > MOST_SAMPLES:
+        raise InputError(f"{motion.duration:g} s at steps of {step:g} s make more than {MOST_SAMPLES:,} samples")
     t = np.linspace(0.0, motion.duration, int(np.ceil(motion.duration / step)) + 1)
     q, qd, qdd, qddd = motion(t)
     return Trajectory.from_samples(t, q, qd, qdd, qddd if motion.law.jerk_limited else None)
@@ -140,6 +145,7 @@ def read_csv(path: str | Path) -> Trajectory:
     except pa.ArrowInvalid as error:
         raise InputError(f"{path}: not a motion's CSV: {error}") from None
     names = set(table.column_names)
+    _complain(path, "has twice the column", {name for name in names if table.column_names.count(name) > 1})
     needed = set(COLUMNS if names & set(COLUMNS[6:]) else COLUMNS[:6])
     _complain(path, "lacks the column", needed - names)
     _complain(path, "has an unknown column", names - numbers.keys())

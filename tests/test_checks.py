@@ -216,13 +216,70 @@ def test_a_nearly_flat_parallelogram_is_warned_of(gap, verdict):
     assert np.degrees(row.demand) == pytest.approx(min(gap, 180.0 - gap), abs=1e-9)
 
 
-def test_friction_enters_the_checks_where_it_is_known():
-    rough = replace(BOOM, friction=Friction(np.full(5, 2.0), np.full(5, 7.0), (Origin(Basis.PRINTED, "bench"),) * 5))
-    peaks = [{peak.joint: peak for peak in check(boom, PATH).peaks}["lower"] for boom in (BOOM, rough)]
-    assert peaks[0].friction == 0.0
-    moving = check(rough, plan(BOOM, "transport", "phenotyping").trajectory)
-    smooth = check(BOOM, plan(BOOM, "transport", "phenotyping").trajectory)
-    assert rows_of(moving, "yaw", "drive RMS torque").demand > rows_of(smooth, "yaw", "drive RMS torque").demand
+def rough_boom() -> Boom:
+    friction = Friction(
+        np.array([0.0, 60.0, 60.0, 0.0, 0.0]), np.array([0.0, 60.0, 60.0, 0.0, 0.0]), (None, GUESS, GUESS, None, None)
+    )
+    return replace(BOOM, friction=friction)
+
+
+GUESS = Origin(Basis.ASSUMED, "a guess")
+
+
+def test_friction_enters_the_checks_both_ways_and_is_said_to_be_assumed():
+    """The reversed row is the forward row of the motion run backwards, whose friction turns round."""
+    motion = plan(BOOM, "transport", "phenotyping").trajectory
+    back = Trajectory.from_samples(motion.t, motion.q[::-1], -motion.qd[::-1], motion.qdd[::-1])
+    there, again = check(rough_boom(), motion), check(rough_boom(), back)
+    for one, other in (("motor torque", "motor torque, reversed"), ("motor torque, reversed", "motor torque")):
+        assert rows_of(there, "lower", one).demand == pytest.approx(rows_of(again, "lower", other).demand, rel=1e-12)
+    smooth = check(BOOM, motion)
+    assert (
+        rows_of(there, "lower", "gearbox repeated peak").demand
+        > rows_of(smooth, "lower", "gearbox repeated peak").demand + 30.0
+    )
+    assert rows_of(there, "lower", "gearbox repeated peak").basis is Basis.ASSUMED
+    assert rows_of(smooth, "lower", "gearbox repeated peak").basis is Basis.PRINTED
+    assert "lower friction: a guess" in there.assumptions
+
+
+@pytest.mark.parametrize("profile", ["cubic", "time-optimal", "jerk-limited"])
+def test_planned_moves_keep_the_motors_margin_with_friction(profile):
+    report = plan(rough_boom().with_payload(14.0), "transport", "phenotyping", profile=profile).report
+    for joint in ("inner", "lower"):
+        assert rows_of(report, joint, "motor torque").margin >= 0.5 - 1e-3
+
+
+def test_planned_moves_keep_the_gearboxs_start_stop_torque():
+    """A motor far stronger than its gearbox, and fast joints: the gearbox bears the joint's torque, the rotor's share not."""
+    motor = replace(BOOM.drives[1].motor, running_torque=40.0, holding_torque=50.0)
+    limits = replace(BOOM.limits, velocity=4.0 * BOOM.limits.velocity, acceleration=20.0 * BOOM.limits.acceleration)
+    strong = replace(with_drives(motor=motor), limits=limits).with_payload(22.0)
+    ratios = []
+    for start, goal in (("transport", "phenotyping"), ("phenotyping", "transport")):
+        report = plan(strong, start, goal, profile="time-optimal").report
+        ratios += [row.demand / row.limit for row in report.rows if row.check == "gearbox repeated peak"]
+    assert 0.99 < max(ratios) <= 1.001
+
+
+def test_a_low_voltage_is_seen_at_low_speed_too():
+    """At 2 V the curve leaves less than the running torque long before 60 rpm."""
+    row = rows_of(check(with_drives(bus_voltage=Sourced(2.0, GUESS)), PATH), "lower", "motor torque")
+    assert row.limit < 7.2
+    assert row.basis is Basis.ASSUMED
+
+
+def test_both_readings_of_the_efficiency_are_reported():
+    row = rows_of(check(BOOM, PATH, payload_as="force"), "inner", "motor torque, reversed")
+    assert f"{row.demand - 0.42:.3f} Nm if the sheet's efficiency holds the no-load torque already" in row.source
+
+
+def test_an_absurd_state_is_refused_and_never_passes():
+    qd = np.zeros((3, 5))
+    qd[1, 2] = 1e200
+    wild = Trajectory.from_samples([0.0, 1.0, 2.0], np.tile(BOOM.pose("transport"), (3, 1)), qd, np.zeros((3, 5)))
+    with pytest.raises(InputError, match=r"sample 1, t = 1 s: its torques are not finite"):
+        check(BOOM, wild)
 
 
 def test_torque_peaks_add_up():

@@ -161,18 +161,24 @@ def test_validate_holds(boom):
         (("torque", "none.csv", "--out", "x.csv"), 2, "none.csv: cannot be read"),
         (("check", "bad.toml"), 2, "bad.toml: lacks the column"),
         (("view", "none.rrd"), 2, "none.rrd"),
+        (("plan", "transport", "phenotyping", "--csv", "move.rrd"), 2, "it is to hold two things"),
+        (("plan", "transport", "phenotyping", "--out", "."), 2, "cannot be written"),
+        (("plan", "transport", "phenotyping", "--duration", "1e9"), 2, "make more than 10,000,000 samples"),
+        (("plan", "transport", "phenotyping", "--along", "line"), 2, "is no tip target"),
+        (("check", "twice.csv"), 2, "has twice the column q1"),
         (("dance",), 2, "No such command 'dance'"),
     ],
 )
 def test_bad_input_gets_one_line_and_its_code_and_leaves_no_file(boom, tmp_path, arguments, code, message):
     (tmp_path / "bad.toml").write_text("x = 1\n")
+    (tmp_path / "twice.csv").write_text("t,q1,q1,q2,q3,q4,q5\n0,0,0,0,0,0,0\n")
     answer, out, err = boom(*arguments)
     assert answer == code
     assert message in err
     assert err.startswith("boom: ")
     assert err.count("\n") == 1
     assert out == ""
-    assert set(os.listdir(tmp_path)) <= {"bad.toml"} | ({"move.rrd"} if "--csv" in arguments else set())
+    assert set(os.listdir(tmp_path)) <= {"bad.toml", "twice.csv"}
 
 
 def test_infeasible_plan_as_json_is_still_one_object(boom):

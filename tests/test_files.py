@@ -35,6 +35,21 @@ def test_place_that_cannot_be_written_is_named(name, tmp_path):
         pass
 
 
+def test_a_link_stays_and_its_target_is_replaced(tmp_path):
+    (tmp_path / "target.txt").write_text("old")
+    (tmp_path / "link.txt").symlink_to("target.txt")
+    with replacing(tmp_path / "link.txt") as temporary, open(temporary, "w") as file:
+        file.write("new")
+    assert (tmp_path / "link.txt").is_symlink()
+    assert (tmp_path / "target.txt").read_text() == "new"
+
+
+def test_what_is_no_regular_file_is_left_alone(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="no regular file"), replacing(tmp_path / "pipe"):
+        pass
+
+
 def test_disk_that_refuses_is_an_input_error(tmp_path):
     with pytest.raises(InputError, match="No space left"), replacing(tmp_path / "out.txt"):
         raise OSError(28, "No space left on device")

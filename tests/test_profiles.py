@@ -8,7 +8,7 @@ import pytest
 from boom_model import Boom, InfeasibleError, inverse_dynamics
 from boom_model.drives import reflected_inertia
 from planner import InfeasiblePathError, Profile, plan, sample
-from planner.constraints import drive_limits
+from planner.constraints import motor_limits
 
 BOOM = Boom.load()
 LIMITS = BOOM.limits
@@ -26,7 +26,7 @@ def worst_ratios(move):
     return {
         "velocity": np.abs(fine.qd / boom.limits.velocity).max(),
         "acceleration": np.abs(fine.qdd / boom.limits.acceleration).max(),
-        "torque": np.abs(tau / drive_limits(boom, fine.qd)).max(),
+        "torque": np.abs(tau / motor_limits(boom, fine.qd)).max(),
     }
 
 

@@ -142,7 +142,9 @@ def test_torque_parts_are_there_with_their_sum(recorded: Recorded, i: int):
 
 def test_mount_wrench_is_there(recorded: Recorded):
     for kind, columns in (("force", slice(0, 3)), ("moment", slice(3, 6))):
-        np.testing.assert_array_equal(recorded.scalars(f"/plots/mount/{kind}"), recorded.move.loads.mount[:, columns])
+        vectors = recorded.move.loads.mount[:, columns]
+        expected = np.column_stack([vectors, np.linalg.norm(vectors, axis=-1)])
+        np.testing.assert_array_equal(recorded.scalars(f"/plots/mount/{kind}"), expected)
 
 
 @pytest.mark.parametrize("which", ["recorded", "standing"])

@@ -9,7 +9,7 @@ from planner.path import Path
 from planner.profiles.cubic import cubic
 from planner.time_law import Motion, TimeLaw
 
-_SAMPLES = 2001
+_SAMPLES = 20_001
 _ROUNDING = 1e-9
 
 

@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from toppra.interpolator import AbstractGeometricPath
 from boom_model import BaseMotion, Boom
 from boom_model.arrays import Array
 from boom_model.drives import drive_torque_tangent
-from planner.constraints import PathDynamics, drive_limits, explain_infeasible, path_dynamics
+from planner.constraints import PathDynamics, explain_infeasible, gear_limits, motor_limits, path_dynamics
 from planner.path import Path
 from planner.profiles.cubic import cubic
 from planner.time_law import TimeLaw
@@ -29,7 +30,7 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
     """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
 
     The path acceleration is constant over each of the `intervals` equal steps in s, and the conditions hold at both ends of
-    each step (toppra's interpolation scheme), so that the torques between them exceed their limits by rounding only.
+    each step (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step.
 
     A drive's limit falls with its speed, and toppra holds only what is linear in u and x. The curve is therefore replaced by
     its tangent, which never allows more; the first solve takes the tangent at the curve's corner, each further one at the
@@ -62,19 +63,26 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
 def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
     """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,)."""
     boom, zero = demands.boom, np.zeros_like(demands.s)
+    at_rest, gears, rotors = motor_limits(boom, np.zeros(5)), gear_limits(boom), demands.rotors
     columns = []
-    for i, (drive, at_rest) in enumerate(zip(boom.drives, drive_limits(boom, np.zeros(5)), strict=True)):
+    for i, drive in enumerate(boom.drives):
         p1, p2, limit = demands.p1[:, i], demands.p2[:, i], boom.limits.acceleration[i]
-        torque = [part[:, i] / at_rest for part in (demands.a, demands.b, demands.c)]
-        tangent = None if drive is None else drive_torque_tangent(drive, p1 * np.sqrt(x))
         for sign in (1.0, -1.0):
             columns.append((sign * p1 / limit, sign * p2 / limit, zero))
-            a, b, c = (sign * part for part in torque)
-            if np.isfinite(at_rest):
-                columns.append((a, b, c))
-            if tangent is not None:
-                intercept, slope = tangent[0] / at_rest, tangent[1] * p1**2 / at_rest
-                columns.append((a, b - slope, c - intercept + 1.0))
+        if drive is None:
+            continue
+        tangent = drive_torque_tangent(drive, p1 * np.sqrt(x))
+        torques = [demands.c[:, i]] + ([demands.c[:, i] + demands.friction[:, i]] if demands.friction[:, i].any() else [])
+        for sign, held in product((1.0, -1.0), torques):
+            a, b, c = sign * demands.a[:, i], sign * demands.b[:, i], sign * held
+            if np.isfinite(gears[i]):
+                columns.append((a / gears[i], b / gears[i], c / gears[i]))
+            if np.isfinite(at_rest[i]):
+                a, b = a + sign * rotors[i] * p1, b + sign * rotors[i] * p2
+                columns.append((a / at_rest[i], b / at_rest[i], c / at_rest[i]))
+                if tangent is not None:
+                    intercept, slope = tangent[0], tangent[1] * p1**2
+                    columns.append((a / at_rest[i], (b - slope) / at_rest[i], (c - intercept) / at_rest[i] + 1.0))
     a, b, c = (np.stack(part, axis=-1) for part in zip(*columns, strict=True))
     return a, b, c
 
