@@ -6,8 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
-from boom_model.boom import Boom
+from boom_model.boom import JOINTS, Boom
 from boom_model.closure import closed_by_angle, closed_by_extension, turned_into_limits
+from boom_model.drives import drive_torque_limit
+from boom_model.equations_of_motion import gravity_torque
 from boom_model.errors import InfeasibleError, InputError
 from boom_model.families import Targets, best_member
 from boom_model.holds import ActuatorHorizontal, ChoiceHold, ConstraintHold, FixedExtension, Hold, LargestMargin, NearestPose
@@ -42,7 +44,8 @@ class Solution:
     """(5,)"""
     within_limits: bool
     reasons: tuple[str, ...]
-    """Each limit that it breaks and by how much; and what was chosen where the target leaves a joint free."""
+    """Each position limit that it breaks and by how much; each drive that cannot hold its load there, payload included; and
+    what was chosen where the target leaves a joint free. Drives do not count in `within_limits`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +135,17 @@ def inverse_kinematics_of_pose(
 
 
 def _solution(boom: Boom, q: Array, note: tuple[str, ...] = ()) -> Solution:
-    return Solution(read_only(q), bool(boom.limits.hold(q)), (*note, *boom.limits.reasons(q)))
+    return Solution(read_only(q), bool(boom.limits.hold(q)), (*note, *boom.limits.reasons(q), *_overloads(boom, q)))
+
+
+def _overloads(boom: Boom, q: Array) -> list[str]:
+    held = np.abs(gravity_torque(boom, q))
+    limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
+    return [
+        f"{joint} must hold {torque:.4g} Nm, and its drive allows {float(limit):.4g} Nm"
+        for joint, torque, limit in zip(JOINTS, held, limits, strict=True)
+        if limit is not None and torque > limit
+    ]
 
 
 def _free_pitch(boom: Boom, position: Array, hold: Hold) -> float:

@@ -42,7 +42,10 @@ def nearest_reachable(boom: Boom, position: ArrayLike, pitch: float, hold: Hold)
     position, pitch = checked("position", position, 3), scalar("pitch", pitch)
     if position.shape != (3,):
         raise InputError(f"position has shape {position.shape}; it must be (3,)")
-    length = float(np.linalg.norm(position))
+    with np.errstate(over="ignore"):
+        length = float(np.linalg.norm(position))
+    if not np.isfinite(length):
+        raise InputError(f"position {position.tolist()} m is too far away to measure a distance")
     if length == 0.0:
         return None
     g, limits = boom.geometry, boom.limits

@@ -176,16 +176,17 @@ def plan(
 @click.argument("z", type=float)
 @pitch_option
 @hold_option
+@payload_option
 @boom_option
 @json_option
-def ik(x: float, y: float, z: float, pitch: str, hold: str, boom_file: str | None, as_json: bool) -> int:
+def ik(x: float, y: float, z: float, pitch: str, hold: str, payload: float | None, boom_file: str | None, as_json: bool) -> int:
     """Every joint position that puts the tip at X Y Z (m, in the base frame).
 
     \b
     Example:
       boom ik 1.4 0 1.0 --pitch down --hold extension=0.25
     """
-    boom = _load(boom_file)
+    boom = _load(boom_file, payload)
     angle, held, position = parse_pitch(pitch), parse_hold(hold), (x, y, z)
     found = inverse_kinematics(boom, position, angle, held)
     reason = None if found.best is not None else unreachable(boom, position, angle, held)

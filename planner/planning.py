@@ -30,7 +30,7 @@ from planner.path import JointLine, Path, TipArc, TipLine, TipPath, follow
 from planner.report import Report, assumptions, torque_peaks
 from planner.targets import Target, TipTarget, resolve
 from planner.time_law import Motion, TimeLaw
-from planner.trajectory import STEP, Trajectory, at_rest, joined, sample
+from planner.trajectory import STEP, Trajectory, at_rest, check_size, joined, sample
 from planner.vehicle import VehicleCase, base_motion
 
 CHECKS_PER_STEP = 10
@@ -109,6 +109,8 @@ def plan(
         raise InputError(f"profile is {profile!r}; there are: {', '.join(Profile)}") from None
     if duration is not None and not float(checked("duration", duration)) > 0.0:
         raise InputError(f"duration is {duration:g} s; it must be above 0 s")
+    if duration is not None:
+        check_size(duration, step)
     hold = ActuatorHorizontal() if hold is None else hold
     paths = _paths(boom, (start, *via, goal), pitch, hold, along)
     if not paths:

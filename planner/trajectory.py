@@ -73,6 +73,16 @@ class Trajectory:
         return float(self.t[-1] - self.t[0])
 
 
+def check_size(duration: float, step: float) -> None:
+    """Whether a motion of that duration can be sampled.
+
+    Raises:
+        InputError: it makes more than MOST_SAMPLES.
+    """
+    if duration > MOST_SAMPLES * step:
+        raise InputError(f"{duration:g} s at steps of {step:g} s make more than {MOST_SAMPLES:,} samples")
+
+
 def sample(motion: Motion, step: float = STEP) -> Trajectory:
     """The motion at equal steps of at most `step` seconds, its two ends included.
 
@@ -81,8 +91,7 @@ def sample(motion: Motion, step: float = STEP) -> Trajectory:
     """
     if not float(checked("step", step)) > 0.0:
         raise InputError(f"step is {step} s; it must be above 0 s")
-    if motion.duration / step > MOST_SAMPLES:
-        raise InputError(f"{motion.duration:g} s at steps of {step:g} s make more than {MOST_SAMPLES:,} samples")
+    check_size(motion.duration, step)
     t = np.linspace(0.0, motion.duration, int(np.ceil(motion.duration / step)) + 1)
     q, qd, qdd, qddd = motion(t)
     return Trajectory.from_samples(t, q, qd, qdd, qddd if motion.law.jerk_limited else None)

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from boom_model import Boom
+from boom_model import Boom, inverse_dynamics
 from boom_model.boom_file import BOOM_FILE
 from planner import cli, plan, read_csv
 
@@ -89,6 +89,17 @@ def test_ik_lists_every_branch(boom):
     code, out, _ = boom("ik", "1.4", "0", "1.0", "--hold", "extension=0.25")
     assert code == 0
     assert "68.9229" in out
+
+
+def test_ik_says_which_drive_cannot_hold_the_payload(boom):
+    _, light, _ = boom("ik", "2.6", "0", "0.5", "--json")
+    _, heavy, _ = boom("ik", "2.6", "0", "0.5", "--payload", "40", "--json")
+    told = [solution["reasons"] for solution in json.loads(heavy)["solutions"] if solution["within_limits"]]
+    held = inverse_dynamics(
+        Boom.load().with_payload(40.0), json.loads(heavy)["solutions"][1]["q"], np.zeros(5), np.zeros(5)
+    ).tau
+    assert f"lower must hold {held[2]:.4g} Nm, and its drive allows 455.5 Nm" in told[0]
+    assert [s["reasons"] for s in json.loads(light)["solutions"] if s["within_limits"]] == [[]]
 
 
 def test_ik_takes_negative_numbers(boom):
