@@ -150,6 +150,17 @@ ChoiceHold = LeastExtension | NearestHorizontal | LeastTorque | NearestPose | La
 Hold = ConstraintHold | ChoiceHold
 
 
+def measure(boom: Boom, hold: Hold, reference: ArrayLike | None = None) -> ChoiceHold:
+    """What the best of several branches has least of: a choice hold's own cost, else the distance to a reference pose.
+
+    Raises:
+        InputError: reference is not finite or not (5,).
+    """
+    if isinstance(hold, ConstraintHold):
+        return NearestPose.to((boom.limits.lower + boom.limits.upper) / 2.0 if reference is None else reference)
+    return hold
+
+
 def _spans(boom: Boom) -> Array:
     span = boom.limits.upper - boom.limits.lower
     return np.where(span > 0.0, span, 1.0)

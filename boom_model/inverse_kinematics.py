@@ -12,7 +12,7 @@ from boom_model.drives import drive_torque_limit
 from boom_model.equations_of_motion import gravity_torque
 from boom_model.errors import InfeasibleError, InputError
 from boom_model.families import Targets, best_member
-from boom_model.holds import ActuatorHorizontal, ChoiceHold, ConstraintHold, FixedExtension, Hold, LargestMargin, NearestPose
+from boom_model.holds import ActuatorHorizontal, ChoiceHold, ConstraintHold, FixedExtension, Hold, LargestMargin, measure
 
 _PITCHES = 360
 _REFINEMENTS = 40
@@ -150,12 +150,12 @@ def _overloads(boom: Boom, q: Array) -> list[str]:
 
 def _free_pitch(boom: Boom, position: Array, hold: Hold) -> float:
     """The pitch with the least cost, by a scan of the whole turn and golden section; straight down where none is reachable."""
-    measure = LargestMargin() if isinstance(hold, ConstraintHold) else hold
+    chooses = LargestMargin() if isinstance(hold, ConstraintHold) else hold
 
     def cost(pitch: Array) -> Array:
         found = solve_branches(boom, position, pitch, hold)
         values = np.full(found.within_limits.shape, np.inf)
-        values[found.within_limits] = measure.cost(boom, found.q[found.within_limits])
+        values[found.within_limits] = chooses.cost(boom, found.q[found.within_limits])
         least: Array = values.min(axis=-1)
         return least
 
@@ -243,9 +243,6 @@ def _chosen(boom: Boom, targets: Targets, hold: ChoiceHold, distinct: Mask) -> t
 
 
 def _best(boom: Boom, solutions: tuple[Solution, ...], hold: Hold, reference: ArrayLike | None) -> int | None:
-    if isinstance(hold, ConstraintHold):
-        measure: ChoiceHold = NearestPose.to((boom.limits.lower + boom.limits.upper) / 2.0 if reference is None else reference)
-    else:
-        measure = hold
     allowed = [i for i, s in enumerate(solutions) if s.within_limits]
-    return min(allowed, key=lambda i: float(measure.cost(boom, solutions[i].q)), default=None)
+    least_of = measure(boom, hold, reference)
+    return min(allowed, key=lambda i: float(least_of.cost(boom, solutions[i].q)), default=None)

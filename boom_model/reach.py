@@ -9,7 +9,7 @@ from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.boom import Boom
 from boom_model.drives import drive_torque_limit
 from boom_model.errors import InputError
-from boom_model.holds import ConstraintHold, FixedExtension, Hold, LeastTorque
+from boom_model.holds import FixedExtension, Hold, LeastTorque, measure
 from boom_model.inverse_kinematics import solve_branches
 
 _SAMPLES = 4001
@@ -122,7 +122,7 @@ def reach_map(
     x, height = np.meshgrid(r, z)
     found = solve_branches(boom, np.stack([x, np.zeros_like(x), height], axis=-1), pitch, hold)
     cost = np.full(found.within_limits.shape, np.inf)
-    cost[found.within_limits] = _cost(boom, hold, found.q[found.within_limits])
+    cost[found.within_limits] = measure(boom, hold).cost(boom, found.q[found.within_limits])
     best = np.argmin(cost, axis=-1)[..., None]
     q = np.take_along_axis(found.q, best[..., None], axis=-2)[..., 0, :]
     within, exists = (np.asarray(mask.any(axis=-1)) for mask in (found.within_limits, found.exists))
@@ -132,15 +132,6 @@ def reach_map(
         margin[within] = 1.0 - LeastTorque().cost(boom, q[within])
     exists.flags.writeable = within.flags.writeable = False
     return ReachMap(hold, pitch, r, z, exists, within, read_only(q), read_only(margin))
-
-
-def _cost(boom: Boom, hold: Hold, q: Array) -> Array:
-    """What the best branch has least of, (k,) of q (k, 5)."""
-    if not isinstance(hold, ConstraintHold):
-        return hold.cost(boom, q)
-    lower, upper = boom.limits.lower, boom.limits.upper
-    distance: Array = np.linalg.norm((q - (lower + upper) / 2.0) / np.where(upper > lower, upper - lower, 1.0), axis=-1)
-    return distance
 
 
 def _rising(name: str, values: ArrayLike) -> Array:

@@ -401,8 +401,13 @@ def random_states(boom: Boom, count: int, rng: np.random.Generator) -> tuple[Arr
 
 def random_base(rng: np.random.Generator, *shape: int) -> BaseMotion:
     """A base motion with entries (*shape, 3): any tilt, up to 5 in SI along each axis of frame 1."""
-    rates = rng.uniform(-1.0, 1.0, (4, *shape, 3)) * np.array([3.0, 1.5, 5.0, 2.0]).reshape(4, *(1 for _ in (*shape, 3)))
-    return BaseMotion.of(*rates, up=rng.normal(size=(*shape, 3)))
+    return BaseMotion.of(
+        velocity=rng.uniform(-3.0, 3.0, (*shape, 3)),
+        angular_velocity=rng.uniform(-1.5, 1.5, (*shape, 3)),
+        acceleration=rng.uniform(-5.0, 5.0, (*shape, 3)),
+        angular_acceleration=rng.uniform(-2.0, 2.0, (*shape, 3)),
+        up=rng.normal(size=(*shape, 3)),
+    )
 
 
 def instants(base: BaseMotion | None, count: int) -> list[BaseMotion]:
