@@ -20,7 +20,7 @@ IS_LENGTH = read_only([0, 0, 0, 1, 0]).astype(bool)
 """True where a joint coordinate is a length [m] and not an angle [rad]."""
 
 MOVING_BODIES = ("lower", "inner", "outer", "upper", "extension", "end_effector")
-"""Bodies that move against the yawing base; the payload is a point mass at the tip."""
+"""Bodies that move against the yawing base; the payload moves with the end effector."""
 
 LIMIT_TOLERANCE = 1e-9
 """Slack [rad or m] of every comparison with a position limit: rounding is not a violation."""

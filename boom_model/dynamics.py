@@ -36,6 +36,7 @@ _CHUNK = 1280
 a second one gains nothing on so thin a matrix, and waits for its turn on a busy machine."""
 
 _O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
+_BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
 _LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
 
 
@@ -102,8 +103,7 @@ def inverse_dynamics(
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]
-    moving = [] if base is None else [base.angular_velocity, base.angular_acceleration, base.acceleration, base.up]
-    outside = [_vectors(f"base entry {i}", x, shape) for i, x in enumerate(moving)]
+    outside = [] if base is None else [_vectors(f"base {name}", getattr(base, name), shape) for name in _BASE_ENTRIES]
     push = None if tip_force is None else _vectors("tip_force", tip_force, shape)
     twist = None if tip_moment is None else _vectors("tip_moment", tip_moment, shape)
     count = len(motion[0])
