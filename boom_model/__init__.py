@@ -50,7 +50,7 @@ from boom_model.kinematics import (
     transmission_angle,
 )
 from boom_model.provenance import Basis, Origin, Sourced
-from boom_model.reach import NearestReachable, nearest_reachable
+from boom_model.reach import NearestReachable, ReachMap, nearest_reachable, reach_map
 from boom_model.torque_breakdown import Breakdown, breakdown
 
 __all__ = [
@@ -89,6 +89,7 @@ __all__ = [
     "NearestReachable",
     "Origin",
     "PinForces",
+    "ReachMap",
     "Solution",
     "Solutions",
     "Sourced",
@@ -115,6 +116,7 @@ __all__ = [
     "mass_matrix",
     "nearest_reachable",
     "potential_energy",
+    "reach_map",
     "solve_branches",
     "transmission_angle",
     "up_on_slope",

@@ -94,8 +94,8 @@ class ReachMap:
     torque_margin: Array
     """(m, n) At q, at rest on level ground: 1 - the largest |static torque| / (what the drive allows at rest).
 
-    Joints without a drive do not count, because nobody knows what they bear. Negative where a drive cannot hold the boom, NaN
-    where q is, and everywhere if no joint has a drive."""
+    Joints without a drive do not count, because nobody knows what they bear. Negative above a drive's limit, NaN where q is,
+    and everywhere if no joint has a drive."""
 
 
 def reach_map(
@@ -103,8 +103,8 @@ def reach_map(
 ) -> ReachMap:
     """The reach of the arm's vertical plane for one hold and pitch: tip at (r, 0, z) of frame 1, at every cell.
 
-    The arm stands forward or turned round, as the yaw's limits allow. Nothing is said of the ground, the vehicle or the boom
-    itself being in the way.
+    The arm stands forward or turned round, as the yaw's limits allow. Collision with the ground, the vehicle or the boom
+    itself is not considered.
 
     Args:
         pitch: elevation of the end effector above the boom's own forward horizontal [rad]; -pi/2 faces down.

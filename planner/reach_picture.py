@@ -11,11 +11,11 @@ from boom_model.reach import ReachMap
 from planner.files import replacing
 
 OVERLOADED = (213, 94, 0)
-"""Colour of a negative margin, where a drive cannot hold the boom."""
-OUTSIDE_LIMITS = (200, 200, 200)
-MARGIN_UNKNOWN = (86, 180, 233)
+"""Colour of a negative margin, above a drive's limit."""
+OUTSIDE_LIMITS = (222, 222, 222)
+MARGIN_UNKNOWN = (204, 121, 167)
 """Colour of what is reached by a boom without drives."""
-_COLORMAP = "cividis"  # rises in lightness alike for the colour-blind and on grey paper
+_COLORMAP = "viridis"  # the colour-blind can read it, and none of it is the grey of OUTSIDE_LIMITS
 
 
 def write_reach_picture(path: str | Path, boom: Boom, reach_map: ReachMap, title: str, *, show_boom: bool = True) -> None:
@@ -36,14 +36,15 @@ def write_reach_picture(path: str | Path, boom: Boom, reach_map: ReachMap, title
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    figure = Figure(figsize=(11.0, 7.0), dpi=140, layout="constrained")
+    tall = float(np.ptp(_edges(reach_map.z)) / np.ptp(_edges(reach_map.r)))
+    figure = Figure(figsize=(11.0, float(np.clip(9.0 * tall, 2.0, 20.0)) + 2.0), dpi=140, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     axes.pcolormesh(_edges(reach_map.r), _edges(reach_map.z), _cell_colors(reach_map), rasterized=True)
     legend: list[Patch | Line2D] = []
     for name, color, shown in (
         ("reached, margin unknown (no drives)", MARGIN_UNKNOWN, reach_map.within_limits & np.isnan(reach_map.torque_margin)),
-        ("a drive cannot hold it", OVERLOADED, reach_map.torque_margin < 0.0),
+        ("above a drive's limit", OVERLOADED, reach_map.torque_margin < 0.0),
         ("only outside the joint limits", OUTSIDE_LIMITS, reach_map.exists & ~reach_map.within_limits),
     ):
         if shown.any():
@@ -51,7 +52,7 @@ def write_reach_picture(path: str | Path, boom: Boom, reach_map: ReachMap, title
     if np.isfinite(reach_map.torque_margin).any():
         low, high = margin_range(reach_map)
         colors = ScalarMappable(Normalize(low, high), _COLORMAP)
-        figure.colorbar(colors, ax=axes, label="torque margin [-]", shrink=0.8)
+        figure.colorbar(colors, cax=axes.inset_axes((1.02, 0.0, 0.025, 1.0)), label="torque margin [-]")
     if show_boom:
         q, name = reference_pose(boom)
         for line in _links(boom, q):
@@ -78,7 +79,7 @@ def reach_title(boom: Boom, reach_map: ReachMap) -> str:
         f"{boom.name}: reach with hold {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg, "
         f"payload {boom.payload.mass:g} kg",
         f"At rest on level ground; {counts}",
-        "Ground, vehicle and the boom itself are not in the way",
+        "Collision with ground, vehicle or the boom itself is not considered",
     ]
     assumed: dict[str, list[str]] = {}
     for joint, drive in zip(JOINTS, boom.drives, strict=True):

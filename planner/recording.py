@@ -32,7 +32,7 @@ from boom_model.frames import R_LINK_BODY, frame_transforms
 from boom_model.reach import ReachMap
 from planner.files import replacing
 from planner.planning import Move
-from planner.reach_picture import OUTSIDE_LIMITS, margin_colors, margin_range, reach_title, reference_pose
+from planner.reach_picture import margin_colors, margin_range, reach_title, reference_pose
 from planner.trajectory import Trajectory
 from planner.vehicle import VehicleCase, base_pose
 
@@ -52,6 +52,7 @@ JOINT_COLORS = dict(zip(JOINTS, (COLORS[b] for b in ("base", "inner", "lower", "
 LIMIT_COLOR: Color = (213, 94, 0)
 PIN_COLOR: Color = (60, 60, 60)
 PAYLOAD_COLOR: Color = (230, 230, 230)
+OUTSIDE_COLOR: Color = (90, 90, 90)
 
 _STEEL = 7850.0  # [kg/m^3]: the payload is shown as a ball of steel
 
@@ -100,14 +101,17 @@ def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> 
     """
     q, pose = reference_pose(boom)
     title = reach_title(boom, reach_map)
-    reading = f"{title}\n\nColour of a point: the torque margin [-], by the scale beside the map. Boom: {pose}."
+    reading = (
+        f"{title}\nColour of a point: the torque margin [-], by the scale beside the map; orange: above a drive's limit; small "
+        f"and grey: only outside the joint limits.\nBoom: {pose}."
+    )
     x, z = np.meshgrid(reach_map.r, reach_map.z)
     cells = np.stack([x, np.zeros_like(x), z], axis=-1)
-    half = min(float(np.diff(grid).min(initial=0.02)) for grid in (reach_map.r, reach_map.z)) / 2.0
-    shown = np.concatenate([cells[reach_map.exists], frame_transforms(boom, q, "outer")[:, :3, 3]])
+    half = min((float(np.diff(grid).min()) for grid in (reach_map.r, reach_map.z) if grid.size > 1), default=0.02) / 2.0
+    shown = np.concatenate([cells[[0, 0, -1, -1], [0, -1, 0, -1]], frame_transforms(boom, q, "outer")[:, :3, 3]])
 
     def log(recording: rr.RecordingStream) -> None:
-        view = rrb.Spatial3DView(origin="/world", name="Reach [m]", eye_controls=_eye_on(shown, 0.0))
+        view = rrb.Spatial3DView(origin="/world", name="Reach [m]", eye_controls=_eye_on(shown, 0.0, away=0.85))
         text = rrb.TextDocumentView(origin="/reading", name="Reading")
         recording.send_blueprint(_shown_beside(view, text, [3, 1]))
         recording.log("reading", rr.TextDocument(reading.replace("\n", "\n\n"), media_type="text/markdown"), static=True)
@@ -131,14 +135,16 @@ def _log_reach(recording: rr.RecordingStream, reach_map: ReachMap, cells: Array,
     colors = margin_colors(margin[within], between).astype(np.uint8)
     log("within_limits", rr.Points3D(cells[within], colors=colors, radii=half))
     outside = cells[reach_map.exists & ~within]
-    log("outside_limits", rr.Points3D(outside, colors=OUTSIDE_LIMITS, radii=half / 2.0))
+    log("outside_limits", rr.Points3D(outside, colors=OUTSIDE_COLOR, radii=half / 2.0))
     if known:
         levels = np.linspace(*between, 5)
         height = np.linspace(reach_map.z[0], reach_map.z[-1], 5)
-        at = np.stack([np.full(5, reach_map.r[-1] + 0.2), np.zeros(5), height], axis=-1)
-        labels = [f"margin {level:.3g}" for level in levels]
+        at = np.stack([np.full(5, reach_map.r[-1] + 0.15), np.zeros(5), height], axis=-1)
         colors = margin_colors(levels, between).astype(np.uint8)
-        log("scale", rr.Points3D(at, colors=colors, radii=0.05, labels=labels, show_labels=True))
+        log("scale", rr.Points3D(at, colors=colors, radii=0.06))
+        labels = [f"margin {level:.3g}" for level in levels]  # in a colour of their own, as the scale's dark end is not legible
+        beside = at + np.array([0.25, 0.0, 0.0])
+        log("scale/labels", rr.Points3D(beside, colors=PAYLOAD_COLOR, radii=0.001, labels=labels, show_labels=True))
 
 
 def _encoded(name: str, log: Callable[[rr.RecordingStream], None]) -> bytes:
@@ -435,10 +441,10 @@ def _eye(boom: Boom, q: Array) -> rrb.EyeControls3D:
     return _eye_on(points, float(q[len(q) // 2, 0]))
 
 
-def _eye_on(points: Array, yaw: float) -> rrb.EyeControls3D:
-    """From the right of a boom at `yaw`, a little from above, and far enough off to see all points (k, 3)."""
+def _eye_on(points: Array, yaw: float, away: float = 1.1) -> rrb.EyeControls3D:
+    """From the right of a boom at `yaw`, a little from above, and far enough `away` to see all points (k, 3)."""
     center = (points.min(axis=0) + points.max(axis=0)) / 2.0
     direction = np.array([np.sin(yaw), -np.cos(yaw), 0.5])
-    distance = 0.5 + 1.1 * float(np.linalg.norm(np.ptp(points, axis=0)))
+    distance = 0.5 + away * float(np.linalg.norm(np.ptp(points, axis=0)))
     eye = center + distance * direction / np.linalg.norm(direction)
     return rrb.EyeControls3D(position=eye, look_target=center, eye_up=(0.0, 0.0, 1.0))

@@ -1,5 +1,6 @@
 """The reach map: its boundary against closed forms, its cells against kinematics and dynamics, its picture and recording."""
 
+import itertools
 import json
 import subprocess
 import sys
@@ -7,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation, binary_erosion
 
 from boom_model import (
     ActuatorAngle,
@@ -14,6 +16,7 @@ from boom_model import (
     Boom,
     FixedExtension,
     InputError,
+    LeastExtension,
     LeastTorque,
     forward_kinematics,
     inverse_dynamics,
@@ -69,11 +72,54 @@ def test_every_cell_is_reached_within_the_limits_with_its_margin(hold):
         assert np.isnan(values[~found.within_limits]).all()
 
 
-def test_more_payload_leaves_less_margin_where_torque_is_to_be_least():
-    margins = [reach_map(BOOM.with_payload(kg), LeastTorque(), DOWN, R[60:], Z).torque_margin for kg in (2.0, 10.0, 18.0)]
-    seen = np.isfinite(margins[0])
-    assert (margins[1][seen] <= margins[0][seen] + 1e-9).mean() > 0.99  # a light tool can balance what a lighter one does not
-    assert margins[2][seen].min() < margins[0][seen].min()
+@pytest.mark.parametrize("hold", [ActuatorHorizontal(), FixedExtension(0.4), LeastExtension()], ids=str)
+@pytest.mark.parametrize("pitch", [DOWN, -1.2])
+def test_boundary_within_the_limits_is_where_joint_positions_within_them_end(hold, pitch):
+    """Forward kinematics of all joint positions within the limits that meet hold and pitch, against the map, to a cell.
+
+    A sliver between the cells' middles is no cell of the map.
+    """
+    found = reach_map(BOOM, hold, pitch, R, Z)
+    low, high = BOOM.limits.lower, BOOM.limits.upper
+    inner, lower, extension = (np.linspace(low[i], high[i], 81 if hold == LeastExtension() else 401) for i in (1, 2, 3))
+    lower = np.array([np.pi]) if isinstance(hold, ActuatorHorizontal) else lower
+    extension = np.array([hold.extension]) if isinstance(hold, FixedExtension) else extension
+    q = np.stack(np.broadcast_arrays(0.0, *np.meshgrid(inner, lower, extension), 0.0), axis=-1).reshape(-1, 5)
+    q[:, 4] = np.mod(pitch - np.pi / 2.0 - q[:, 2] + np.pi, 2.0 * np.pi) - np.pi
+    tips = forward_kinematics(BOOM, q[BOOM.limits.hold(q)]).position[:, [0, 2]]
+    tips = np.concatenate([tips, tips * (-1.0, 1.0)])  # the base turned round
+    seen = np.histogram2d(tips[:, 1], tips[:, 0], bins=[np.append(g, g[-1] + 0.05) - 0.025 for g in (Z, R)])[0] > 0
+    nearby = np.ones((3, 3))
+    surely = binary_erosion(seen, nearby)
+    assert 0 < surely.sum() < surely.size
+    assert found.within_limits[surely].all()
+    assert binary_dilation(seen, nearby)[found.within_limits].all()
+
+
+def test_map_keeps_to_the_yaw_limits():
+    limits = replace(BOOM.limits, upper=BOOM.limits.upper * (0.25, 1, 1, 1, 1))  # 0 to 90 deg: never turned round
+    found = reach_map(replace(BOOM, limits=limits), ActuatorHorizontal(), DOWN, R, Z)
+    everywhere = reach_map(BOOM, ActuatorHorizontal(), DOWN, R, Z)
+    assert not found.within_limits[:, R < -0.5].any()
+    assert everywhere.within_limits[:, R < -0.5].any()
+    assert (found.q[found.within_limits][:, 0] == 0.0).all()
+
+
+def test_default_grid_covers_the_reach_of_every_hold():
+    found = reach_map(BOOM, LeastExtension())
+    for edge in (found.within_limits[0], found.within_limits[-1], found.within_limits[:, 0], found.within_limits[:, -1]):
+        assert not edge.any()
+    np.testing.assert_allclose([np.diff(found.r).max(), np.diff(found.z).max()], 0.02)
+    assert not any(a.flags.writeable for a in (found.r, found.z, found.exists, found.within_limits, found.q))
+
+
+@pytest.mark.parametrize("hold", [ActuatorHorizontal(), FixedExtension(0.4), LeastTorque()], ids=str)
+def test_more_payload_leaves_less_margin(hold):
+    margins = [reach_map(BOOM.with_payload(kg), hold, DOWN, R[60:], Z).torque_margin for kg in (2.0, 10.0, 18.0)]
+    for lighter, heavier in itertools.pairwise(margins):
+        seen = np.isfinite(lighter)
+        np.testing.assert_array_equal(np.isfinite(heavier), seen)
+        assert (heavier[seen] < lighter[seen]).all()
 
 
 @pytest.mark.parametrize("hold", [ActuatorHorizontal(), FixedExtension(0.4)], ids=str)
@@ -113,6 +159,16 @@ def test_picture_and_recording_are_written(coarse, tmp_path):
     verify = [sys.executable, "-m", "rerun", "rrd", "verify", str(tmp_path / "reach.rrd")]
     done = subprocess.run(verify, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("boom", [replace(BOOM, drives=(None,) * 5), BOOM.with_payload(60.0)], ids=["no drives", "overloaded"])
+@pytest.mark.parametrize("r", [[1.2], [0.9, 1.2, 2.0]])
+def test_odd_maps_are_drawn(boom, r, tmp_path):
+    found = reach_map(boom, FixedExtension(0.4), DOWN, r, [0.3, 0.8])
+    assert found.within_limits.any()
+    picture(tmp_path / "reach.png", boom, found)
+    write_reach_recording(tmp_path / "reach.rrd", boom, found)
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 @pytest.mark.parametrize("write", [picture, write_reach_recording])
