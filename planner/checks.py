@@ -24,7 +24,7 @@ ESTIMATE_WARNING = 0.25
 """A margin on an estimated or assumed figure that exceeds the required one by less than this is a WARN, not a PASS."""
 
 LOW_SPEED = 2.0 * np.pi
-"""Motor speed [rad/s] (60 rpm) up to which a sheet's running torque holds whatever the supply; our own choice."""
+"""Motor speed [rad/s] (60 rpm) up to which a sheet's running torque is taken where the supply is not given; our own choice."""
 
 ANGLE_CHECKS = ("position", "lower - inner", "transmission angle")
 """Checks whose margin is a distance to the bound."""

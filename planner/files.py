@@ -19,9 +19,7 @@ def check_writable(*paths: str | Path | None) -> None:
     for i, path in enumerate(given):
         if path in given[:i]:
             raise InputError(f"{path}: cannot be written: it is to hold two things")
-        handle, temporary = _beside(Path(path))
-        os.close(handle)
-        os.unlink(temporary)
+        os.unlink(_beside(Path(path)))
 
 
 @contextmanager
@@ -32,8 +30,7 @@ def replacing(path: str | Path) -> Iterator[str]:
         InputError: the folder is missing or cannot be written to, or the disk refuses; an old file is left as it was.
     """
     path = Path(os.path.realpath(path))  # a link stays a link, and its target is replaced
-    handle, temporary = _beside(path)
-    os.close(handle)
+    temporary = _beside(path)
     try:
         yield temporary
         os.replace(temporary, path)
@@ -44,15 +41,16 @@ def replacing(path: str | Path) -> Iterator[str]:
             os.unlink(temporary)
 
 
-def _beside(path: Path) -> tuple[int, str]:
-    """An open temporary file in the folder of `path`, and its name."""
+def _beside(path: Path) -> str:
+    """The name of a new, empty temporary file in the folder of `path`."""
     if path.exists() and not path.is_file():
         raise InputError(f"{path}: cannot be written: it is no regular file")
     try:
         handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=path.parent)
+        os.close(handle)
         umask = os.umask(0)
         os.umask(umask)
         os.chmod(temporary, 0o666 & ~umask)  # mkstemp's own mode would hide the file from everyone else
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
-    return handle, temporary
+    return temporary

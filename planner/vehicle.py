@@ -77,17 +77,14 @@ def base_motion(case: VehicleCase, t: ArrayLike) -> BaseMotion:
     steepness_1 = -case.amplitude * k * np.sin(phase) * k * case.speed
     steepness_2 = -steepness * (k * case.speed) ** 2
     level = 1.0 + steepness**2
-    psi = np.arctan(steepness)
     psi_1 = steepness_1 / level
     psi_2 = steepness_2 / level - 2.0 * steepness * steepness_1**2 / level**2
     heave_1 = steepness * case.speed
     heave_2 = -case.amplitude * np.sin(phase) * (k * case.speed) ** 2
-    up = up_on_slope(case.roll, case.pitch - psi)
-    left = np.array([0.0, np.cos(case.roll), -np.sin(case.roll)])  # the pitch axis along frame 1, before the roll
+    ahead, left, up = np.moveaxis(base_pose(case, t)[..., :3, :3], -2, 0)  # the ground's axes along frame 1
     pulse = np.sin(np.pi * (t - case.shock_start) / case.shock_duration)
     inside = (t >= case.shock_start) & (t <= case.shock_start + case.shock_duration)
     shock = np.where(inside, case.peak * pulse, 0.0)[..., None] * np.asarray(case.direction)
-    ahead = _ahead(case, psi)
     return BaseMotion.of(
         velocity=case.speed * ahead + heave_1[..., None] * up,
         angular_velocity=-psi_1[..., None] * left,
@@ -108,18 +105,13 @@ def base_pose(case: VehicleCase, t: ArrayLike) -> Array:
     phase = k * case.speed * t
     pitch = case.pitch - np.arctan(case.amplitude * k * np.cos(phase))
     T = np.zeros((*t.shape, 4, 4))
-    T[..., 0, :3] = _ahead(case, case.pitch - pitch)
-    T[..., 1, :3] = [0.0, np.cos(case.roll), -np.sin(case.roll)]
+    c, s = np.cos(case.roll), np.sin(case.roll)
+    T[..., 0, :3] = np.stack([np.cos(pitch), np.sin(pitch) * s, np.sin(pitch) * c], axis=-1)  # R_y(pitch) R_x(roll)
+    T[..., 1, :3] = [0.0, c, -s]
     T[..., 2, :3] = up_on_slope(case.roll, pitch)
     T[..., 2, 3] = case.amplitude * np.sin(phase)
     T[..., 3, 3] = 1.0
     return T
-
-
-def _ahead(case: VehicleCase, psi: Array) -> Array:
-    """The track's horizontal direction along frame 1: R_ground_base^T (1, 0, 0) for R = R_y(pitch) R_x(roll)."""
-    pitch = case.pitch - psi
-    return np.stack([np.cos(pitch), np.sin(pitch) * np.sin(case.roll), np.sin(pitch) * np.cos(case.roll)], axis=-1)
 
 
 class _Slope(Table):
