@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from boom_model.arrays import Array
     from planner.report import Report
+    from planner.trajectory import Trajectory
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _PIPE_WIDTH = 132
@@ -29,6 +31,9 @@ payload_as_option = click.option(
     help="Accelerate the payload with the tip, or hang its weight there and leave out its inertia, as the thesis does.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
+report_option = click.option(
+    "--report", "document", metavar="FILE.md|.html|.pdf", help="The report as a document, with pictures, versions and command."
+)
 vehicle_option = click.option(
     "--vehicle",
     metavar="CASE",
@@ -106,6 +111,7 @@ def cli() -> None:
 @payload_option
 @click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
 @click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
+@report_option
 @vehicle_option
 @boom_option
 @json_option
@@ -126,6 +132,7 @@ def plan(
     payload: float | None,
     out: str,
     csv_file: str | None,
+    document: str | None,
     vehicle: str | None,
     boom_file: str | None,
     as_json: bool,
@@ -151,6 +158,7 @@ def plan(
     boom = _load(boom_file, payload)
     case = None if vehicle is None else load_case(vehicle)
     check_writable(out, csv_file)
+    _require_document(document)
     targets = parse_target(start), parse_target(goal)
     options: dict[str, Any] = {
         "profile": profile,
@@ -185,6 +193,7 @@ def plan(
     if csv_file is not None:
         write_csv(move.trajectory, csv_file, move.loads.tau)
         written["csv"] = csv_file
+    _write_document(document, report, boom, move.trajectory, move.loads.tau, written)
     return _print_report(report, written, as_json)
 
 
@@ -398,10 +407,17 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 @payload_option
 @payload_as_option
 @vehicle_option
+@report_option
 @boom_option
 @json_option
 def check(
-    motion: str, payload: float | None, payload_as: Any, vehicle: str | None, boom_file: str | None, as_json: bool
+    motion: str,
+    payload: float | None,
+    payload_as: Any,
+    vehicle: str | None,
+    document: str | None,
+    boom_file: str | None,
+    as_json: bool,
 ) -> int:
     """Hold any motion against the joint limits and the drives' datasheets.
 
@@ -411,12 +427,18 @@ def check(
       boom check move.csv --payload 8
     """
     from planner.planning import check as check_motion
+    from planner.planning import torques
     from planner.trajectory import read_csv
     from planner.vehicle import load_case
 
+    _require_document(document)
     boom, trajectory = _load(boom_file, payload), read_csv(motion)
     case = None if vehicle is None else load_case(vehicle)
-    return _print_report(check_motion(boom, trajectory, payload_as=payload_as, vehicle=case), {}, as_json)
+    report = check_motion(boom, trajectory, payload_as=payload_as, vehicle=case)
+    written: dict[str, str] = {}
+    if document is not None:
+        _write_document(document, report, boom, trajectory, torques(boom, trajectory, payload_as, case), written)
+    return _print_report(report, written, as_json)
 
 
 @cli.command()
@@ -486,6 +508,26 @@ def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> i
         for kind, name in written.items():
             click.echo(f"{kind}: {name}")
     return ANSWER_IS_NO if report.verdict is Verdict.FAIL else 0
+
+
+def _require_document(path: str | None) -> None:
+    from planner.document import require_form
+    from planner.files import check_writable
+
+    if path is not None:
+        require_form(path)
+        check_writable(path)
+
+
+def _write_document(
+    path: str | None, report: "Report", boom: Boom, motion: "Trajectory", tau: "Array", written: dict[str, str]
+) -> None:
+    from planner.document import write_document
+    from planner.move_pictures import move_pictures
+
+    if path is not None:
+        write_document(path, report.to_markdown(), move_pictures(boom, motion, tau))
+        written["report"] = path
 
 
 _STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta"}

@@ -146,7 +146,7 @@ def cells(row: Row) -> tuple[str, ...]:
     elif row.check in ANGLE_CHECKS or row.joint == "arm":
         margin = f"{row.margin * factor:.4g} {unit}"
     else:
-        margin = f"{row.margin:.0%}"
+        margin = f"{round(row.margin, 2) + 0.0:.0%}"  # no -0%
     return (
         row.joint,
         row.check,
