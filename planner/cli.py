@@ -1,9 +1,11 @@
 """The command `boom`: parsing and printing, nothing else. What is slow to import is imported by the command that needs it."""
 
+import io
 import json
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import redirect_stdout
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
@@ -177,7 +179,7 @@ def plan(
     try:
         move = plan_move(boom, *targets, **options)
     except InfeasibleError as error:
-        mend = [remedy.sentence for remedy in remedies(boom, *targets, **options)]
+        mend = [remedy.sentence for remedy in remedies(boom, *targets, _tracked("looking for what would mend it"), **options)]
         if as_json:
             failed: dict[str, Any] = {"profile": profile, "duration_s": None, "verdict": "FAIL", "checks": [], "files": {}}
             _print_json({**failed, "reason": str(error), "remedies": mend})
@@ -185,7 +187,8 @@ def plan(
         raise
     report = move.report
     if report.verdict == "FAIL":
-        report = replace(report, remedies=tuple(remedy.sentence for remedy in remedies(boom, *targets, **options)))
+        found = remedies(boom, *targets, _tracked("looking for what would mend it"), **options)
+        report = replace(report, remedies=tuple(remedy.sentence for remedy in found))
     from planner.recording import write_recording
 
     written = {"recording": out}
@@ -539,11 +542,39 @@ def _print_lines(title: str | None, lines: Iterable[str]) -> None:
 
 
 def _print_json(answer: dict[str, Any]) -> None:
-    click.echo(json.dumps(answer, allow_nan=False, indent=2))
+    out = click.get_current_context().meta.get(_LOUD, sys.stdout)
+    click.echo(json.dumps(answer, allow_nan=False, indent=2), file=out)
 
 
 def _complain(message: str) -> None:
     click.echo(f"boom: {' '.join(message.split())}", err=True)
+
+
+def _tracked(title: str) -> Callable[[list[Any]], Iterable[Any]]:
+    """Iteration with a progress bar on standard error, where that is a terminal."""
+
+    def track(steps: list[Any]) -> Iterable[Any]:
+        from rich.console import Console
+        from rich.progress import track as bar
+
+        return bar(steps, title, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty() or _is_quiet())
+
+    return track
+
+
+_LOUD = "boom.stdout"
+
+
+def _is_quiet() -> bool:
+    return _LOUD in click.get_current_context().meta
+
+
+def _quieten(ctx: click.Context, _: click.Parameter, quiet: bool) -> None:
+    """Standard output goes nowhere until the command ends; JSON, which was asked for, still goes out."""
+    if not quiet or _LOUD in ctx.meta:
+        return
+    ctx.meta[_LOUD], nowhere = sys.stdout, io.StringIO()
+    ctx.with_resource(redirect_stdout(nowhere))
 
 
 def _console() -> "Console":
@@ -558,3 +589,9 @@ def _table(*columns: str) -> "Table":
     from rich.table import Table
 
     return Table(*columns, box=SIMPLE, pad_edge=False)
+
+
+for _command in cli.commands.values():
+    _command.params.append(
+        click.Option(["-q", "--quiet"], is_flag=True, expose_value=False, callback=_quieten, help="Print errors alone.")
+    )

@@ -81,7 +81,8 @@ class PathDynamics:
         u, x = u[:, None], x[:, None]
         smooth = self.a * u + self.b * x + self.c
         qd, qdd = self.p1 * np.sqrt(x), self.p1 * u + self.p2 * x
-        return np.maximum(*(load_ratio(self.boom, torque, qd, qdd) for torque in (smooth, smooth + self.coulomb + self.viscous * np.sqrt(x))))
+        rubbed = smooth + self.coulomb + self.viscous * np.sqrt(x)
+        return np.maximum(load_ratio(self.boom, smooth, qd, qdd), load_ratio(self.boom, rubbed, qd, qdd))
 
     @property
     def static_ratio(self) -> Array:
