@@ -131,15 +131,12 @@ def test_tip_line_is_the_optimum(payload, factors):
     assert_kept(worst_ratios(boom, *throughout(move.motions[0])))
 
 
-@pytest.mark.parametrize(("number", "slower"), [(20, SLOWER), (5, 0.05)], ids=["shipped", "raised"])
-def test_friction_keeps_the_limits_at_little_time(number, slower):
-    """Against an optimum that lets friction help to brake.
-
-    The planner takes viscous friction at the joints' top speed: 0.12 % lost with the shipped limits, 2.7 % with raised ones.
-    """
+@pytest.mark.parametrize("number", [3, 5, 20, 22])
+def test_duration_with_friction_is_the_optimum_that_gives_it_no_credit_while_braking(number):
+    """0.72 % lost at most, with the joints' limits out of the way."""
     case, some = CASES[number], np.zeros(5)
     some[DRIVEN] = 10.0
     boom = replace(case.boom, friction=Friction(viscous=some, coulomb=some, origins=(None,) * 5))
     move = planned(boom, case)
-    assert -FASTER < lost(move, minimum_time(boom, case.line).duration) < slower
+    assert -FASTER < lost(move, minimum_time(boom, case.line, credit=False).duration) < SLOWER
     assert_kept(worst_ratios(boom, *throughout(move.motions[0])))
