@@ -1,6 +1,6 @@
 """How near the arm comes to what it must keep away from (coal, the collision library of Pinocchio)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -15,9 +15,11 @@ from planner.path import Path
 LINKS = ("lower", "outer", "upper", "inner", "actuator", "end effector", "payload")
 """The parts of the arm: a line between two pins each, the payload the point of the tip."""
 
-_RESOLUTION = 1e-3  # [m]; between looks at a path no point of the arm moves farther than this unseen
+_RESOLUTION = 1e-3  # [m]
+_ROUGH = 1001
+_MOST_POINTS = 20_000
 _FIRST_LOOKS = 33
-_MOST_LOOKS = 20_000
+_CLOSER = 0.01  # [m]
 
 
 @dataclass(frozen=True)
@@ -43,34 +45,47 @@ def link_lines(boom: Boom, q: Array) -> Array:
 
 def clearance(boom: Boom, q: Array) -> Clearance:
     """The nearest approach of the arm at q (5,) to a shape of `boom.keep_out`, which must be given."""
-    distances = _distances(boom, q[None])[0]
-    return _nearest(boom, distances, 0.0)
+    return _nearest(boom, _distances(boom, q[None])[0])
 
 
 def least_clearance(boom: Boom, path: Path) -> Clearance:
-    """The nearest approach along a path.
+    """The nearest approach along a path, seen at points between which no point of the arm moves more than a millimetre."""
+    rough = path(np.linspace(0.0, 1.0, _ROUGH))
+    count = int(np.clip(_travel(boom, rough)[-1] / _RESOLUTION, 1, _MOST_POINTS)) + 1
+    s = np.linspace(0.0, 1.0, count)
+    at, found = nearest_approach(boom, path(s))
+    return replace(found, s=float(s[at]))
 
-    Looks are added between two where the arm, however it bends, could come nearer than the clearance: what is found to be
-    clear is clear to within a millimetre.
+
+def nearest_approach(boom: Boom, q: Array) -> tuple[int, Clearance]:
+    """The sample of a motion (n, 5) at which the arm comes nearest to a shape, to a centimetre where it is clear.
+
+    Only samples are looked at between which the arm, however it moves, could come nearer than the clearance, or nearer by a
+    centimetre than the nearest so far.
     """
     keep = boom.keep_out
     assert keep is not None
-    s = np.linspace(0.0, 1.0, _FIRST_LOOKS)
-    distances = _distances(boom, path(s))
-    while len(s) < _MOST_LOOKS:
-        near = distances.reshape(len(s), -1).min(axis=-1)
-        travel = np.abs(np.diff(path(s), axis=0)) @ _reach(boom)
-        could = (near[:-1] + near[1:] - travel) / 2.0  # the least distance that a path of that length could touch between
-        doubtful = (could < keep.clearance) & (travel > _RESOLUTION) & (np.minimum(near[:-1], near[1:]) >= keep.clearance)
-        if not doubtful.any():
+    travel = _travel(boom, q)
+    looked = np.unique(np.linspace(0, len(q) - 1, _FIRST_LOOKS).astype(int))
+    distances = _distances(boom, q[looked])
+    while True:
+        near = distances.reshape(len(looked), -1).min(axis=-1)
+        could = (near[:-1] + near[1:] - np.diff(travel[looked])) / 2.0
+        worth = np.where(near.min() < keep.clearance, near.min(), max(keep.clearance, near.min() - _CLOSER))
+        open_ = (np.diff(looked) > 1) & (could < worth)
+        if not open_.any():
             break
-        added = (s[:-1] + s[1:])[doubtful] / 2.0
-        s = np.concatenate([s, added])
-        distances = np.concatenate([distances, _distances(boom, path(added))])
-        order = np.argsort(s)
-        s, distances = s[order], distances[order]
-    at = int(np.argmin(distances.reshape(len(s), -1).min(axis=-1)))
-    return _nearest(boom, distances[at], float(s[at]))
+        added = ((looked[:-1] + looked[1:]) // 2)[open_]
+        looked, distances = np.concatenate([looked, added]), np.concatenate([distances, _distances(boom, q[added])])
+        order = np.argsort(looked)
+        looked, distances = looked[order], distances[order]
+    at = int(np.argmin(near))
+    return int(looked[at]), _nearest(boom, distances[at])
+
+
+def _travel(boom: Boom, q: Array) -> Array:
+    """(n,) the farthest that a point of the arm can have moved since the first of the positions q (n, 5) [m]."""
+    return np.append(0.0, np.cumsum(np.abs(np.diff(q, axis=0)) @ _reach(boom)))
 
 
 def require_clear(boom: Boom, q: Array, name: str) -> None:
@@ -106,10 +121,10 @@ def sentence(boom: Boom, found: Clearance) -> str:
     return f"the {found.link} {how} the {found.shape}, where {boom.keep_out.clearance * 1e3:.0f} mm are to be kept"
 
 
-def _nearest(boom: Boom, distances: Array, s: float) -> Clearance:
+def _nearest(boom: Boom, distances: Array) -> Clearance:
     assert boom.keep_out is not None
     link, shape = np.unravel_index(int(np.argmin(distances)), distances.shape)
-    return Clearance(float(distances[link, shape]), LINKS[link], boom.keep_out.shapes[shape].name, s)
+    return Clearance(float(distances[link, shape]), LINKS[link], boom.keep_out.shapes[shape].name)
 
 
 @lru_cache(maxsize=8)

@@ -1,9 +1,11 @@
 """The command `boom`: parsing and printing, nothing else. What is slow to import is imported by the command that needs it."""
 
+import io
 import json
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from contextlib import redirect_stdout
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +19,9 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from boom_model.arrays import Array
     from planner.report import Report
+    from planner.trajectory import Trajectory
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _PIPE_WIDTH = 132
@@ -29,6 +33,9 @@ payload_as_option = click.option(
     help="Accelerate the payload with the tip, or hang its weight there and leave out its inertia, as the thesis does.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
+report_option = click.option(
+    "--report", "document", metavar="FILE.md|.html|.pdf", help="The report as a document, with pictures, versions and command."
+)
 vehicle_option = click.option(
     "--vehicle",
     metavar="CASE",
@@ -106,6 +113,7 @@ def cli() -> None:
 @payload_option
 @click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
 @click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
+@report_option
 @vehicle_option
 @boom_option
 @json_option
@@ -126,6 +134,7 @@ def plan(
     payload: float | None,
     out: str,
     csv_file: str | None,
+    document: str | None,
     vehicle: str | None,
     boom_file: str | None,
     as_json: bool,
@@ -151,6 +160,7 @@ def plan(
     boom = _load(boom_file, payload)
     case = None if vehicle is None else load_case(vehicle)
     check_writable(out, csv_file)
+    _require_document(document)
     targets = parse_target(start), parse_target(goal)
     options: dict[str, Any] = {
         "profile": profile,
@@ -169,7 +179,7 @@ def plan(
     try:
         move = plan_move(boom, *targets, **options)
     except InfeasibleError as error:
-        mend = [remedy.sentence for remedy in remedies(boom, *targets, **options)]
+        mend = [remedy.sentence for remedy in remedies(boom, *targets, _tracked("looking for what would mend it"), **options)]
         if as_json:
             failed: dict[str, Any] = {"profile": profile, "duration_s": None, "verdict": "FAIL", "checks": [], "files": {}}
             _print_json({**failed, "reason": str(error), "remedies": mend})
@@ -177,7 +187,8 @@ def plan(
         raise
     report = move.report
     if report.verdict == "FAIL":
-        report = replace(report, remedies=tuple(remedy.sentence for remedy in remedies(boom, *targets, **options)))
+        found = remedies(boom, *targets, _tracked("looking for what would mend it"), **options)
+        report = replace(report, remedies=tuple(remedy.sentence for remedy in found))
     from planner.recording import write_recording
 
     written = {"recording": out}
@@ -185,6 +196,7 @@ def plan(
     if csv_file is not None:
         write_csv(move.trajectory, csv_file, move.loads.tau)
         written["csv"] = csv_file
+    _write_document(document, report, boom, move.trajectory, move.loads.tau, written)
     return _print_report(report, written, as_json)
 
 
@@ -398,10 +410,17 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 @payload_option
 @payload_as_option
 @vehicle_option
+@report_option
 @boom_option
 @json_option
 def check(
-    motion: str, payload: float | None, payload_as: Any, vehicle: str | None, boom_file: str | None, as_json: bool
+    motion: str,
+    payload: float | None,
+    payload_as: Any,
+    vehicle: str | None,
+    document: str | None,
+    boom_file: str | None,
+    as_json: bool,
 ) -> int:
     """Hold any motion against the joint limits and the drives' datasheets.
 
@@ -411,12 +430,18 @@ def check(
       boom check move.csv --payload 8
     """
     from planner.planning import check as check_motion
+    from planner.planning import torques
     from planner.trajectory import read_csv
     from planner.vehicle import load_case
 
+    _require_document(document)
     boom, trajectory = _load(boom_file, payload), read_csv(motion)
     case = None if vehicle is None else load_case(vehicle)
-    return _print_report(check_motion(boom, trajectory, payload_as=payload_as, vehicle=case), {}, as_json)
+    report = check_motion(boom, trajectory, payload_as=payload_as, vehicle=case)
+    written: dict[str, str] = {}
+    if document is not None:
+        _write_document(document, report, boom, trajectory, torques(boom, trajectory, payload_as, case), written)
+    return _print_report(report, written, as_json)
 
 
 @cli.command()
@@ -488,6 +513,26 @@ def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> i
     return ANSWER_IS_NO if report.verdict is Verdict.FAIL else 0
 
 
+def _require_document(path: str | None) -> None:
+    from planner.document import require_form
+    from planner.files import check_writable
+
+    if path is not None:
+        require_form(path)
+        check_writable(path)
+
+
+def _write_document(
+    path: str | None, report: "Report", boom: Boom, motion: "Trajectory", tau: "Array", written: dict[str, str]
+) -> None:
+    from planner.document import write_document
+    from planner.move_pictures import move_pictures
+
+    if path is not None:
+        write_document(path, report.to_markdown(), move_pictures(boom, motion, tau))
+        written["report"] = path
+
+
 _STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta"}
 
 
@@ -497,11 +542,39 @@ def _print_lines(title: str | None, lines: Iterable[str]) -> None:
 
 
 def _print_json(answer: dict[str, Any]) -> None:
-    click.echo(json.dumps(answer, allow_nan=False, indent=2))
+    out = click.get_current_context().meta.get(_LOUD, sys.stdout)
+    click.echo(json.dumps(answer, allow_nan=False, indent=2), file=out)
 
 
 def _complain(message: str) -> None:
     click.echo(f"boom: {' '.join(message.split())}", err=True)
+
+
+def _tracked(title: str) -> Callable[[list[Any]], Iterable[Any]]:
+    """Iteration with a progress bar on standard error, where that is a terminal."""
+
+    def track(steps: list[Any]) -> Iterable[Any]:
+        from rich.console import Console
+        from rich.progress import track as bar
+
+        return bar(steps, title, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty() or _is_quiet())
+
+    return track
+
+
+_LOUD = "boom.stdout"
+
+
+def _is_quiet() -> bool:
+    return _LOUD in click.get_current_context().meta
+
+
+def _quieten(ctx: click.Context, _: click.Parameter, quiet: bool) -> None:
+    """Standard output goes nowhere until the command ends; JSON, which was asked for, still goes out."""
+    if not quiet or _LOUD in ctx.meta:
+        return
+    ctx.meta[_LOUD], nowhere = sys.stdout, io.StringIO()
+    ctx.with_resource(redirect_stdout(nowhere))
 
 
 def _console() -> "Console":
@@ -516,3 +589,9 @@ def _table(*columns: str) -> "Table":
     from rich.table import Table
 
     return Table(*columns, box=SIMPLE, pad_edge=False)
+
+
+for _command in cli.commands.values():
+    _command.params.append(
+        click.Option(["-q", "--quiet"], is_flag=True, expose_value=False, callback=_quieten, help="Print errors alone.")
+    )

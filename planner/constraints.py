@@ -23,6 +23,7 @@ from planner.time_law import Motion, TimeLaw
 
 _LEAST_STRETCH_STEPS = 60
 _FINITE = 1e12
+_LEAST_SHARE = 1e-6
 _SLOPES = 20_001
 
 
@@ -51,8 +52,10 @@ class PathDynamics:
     """(n, 5) joint torque per x"""
     c: Array
     """(n, 5) static torque"""
-    friction: Array
-    """(n, 5) the most that the joints' friction adds, at the largest speed that the joint velocities allow"""
+    coulomb: Array
+    """(n, 5) Coulomb friction, in the direction of the path"""
+    viscous: Array
+    """(n, 5) viscous friction per s'"""
     base: BaseMotion | None
 
     @property
@@ -60,15 +63,26 @@ class PathDynamics:
         """(n,) the bound that the joint velocities set on x."""
         return _largest_x(self.boom, self.p1)
 
+    def friction_tangent(self, x: Array) -> tuple[Array, Array]:
+        """(n, 5) twice: intercept and slope over x of a line that friction, coulomb + viscous sqrt(x), never exceeds.
+
+        Its tangent at x (n,); where x is 0 that at the largest x that the joint velocities allow.
+        """
+        largest = np.minimum(self.x_max, _FINITE)
+        root = np.sqrt(np.where(x > 0.0, np.clip(x, _LEAST_SHARE * largest, None), largest))[:, None]
+        half = self.viscous / 2.0
+        return self.coulomb + half * root, half / root
+
     def torque_ratio(self, u: Array, x: Array) -> Array:
         """(n, 5) the larger of gearbox and motor torque over their limits, at u and x (n,); 0 where no drive limits.
 
-        With friction and without: it may be less than the bound that is taken, and then helps less while braking.
+        With friction and without: it earns no credit while braking.
         """
         u, x = u[:, None], x[:, None]
         smooth = self.a * u + self.b * x + self.c
         qd, qdd = self.p1 * np.sqrt(x), self.p1 * u + self.p2 * x
-        return np.maximum(*(load_ratio(self.boom, torque, qd, qdd) for torque in (smooth, smooth + self.friction)))
+        rubbed = smooth + self.coulomb + self.viscous * np.sqrt(x)
+        return np.maximum(load_ratio(self.boom, smooth, qd, qdd), load_ratio(self.boom, rubbed, qd, qdd))
 
     @property
     def static_ratio(self) -> Array:
@@ -128,9 +142,8 @@ def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = No
     zero = np.zeros_like(p)
     states = [p, p, p], [zero, zero, p1], [zero, p1, p2]
     static, pushed, carried = inverse_dynamics(boom, *states, base=base, reactions=False).tau
-    fastest = p1 * np.sqrt(np.minimum(_largest_x(boom, p1), _FINITE))[:, None]
-    friction = boom.friction.coulomb * np.sign(p1) + boom.friction.viscous * fastest
-    return PathDynamics(boom, path, s, p1, p2, pushed - static, carried - static, static, friction, base)
+    coulomb, viscous = boom.friction.coulomb * np.sign(p1), boom.friction.viscous * p1
+    return PathDynamics(boom, path, s, p1, p2, pushed - static, carried - static, static, coulomb, viscous, base)
 
 
 def _largest_x(boom: Boom, p1: Array) -> Array:

@@ -155,13 +155,13 @@ def check(
     )
 
 
-def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass") -> Array:
-    """Joint torques (n, 5) of a motion on level ground, with the joints' friction where it is known.
+def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None) -> Array:
+    """Joint torques (n, 5) of a motion, on level ground without a vehicle, with the joints' friction where it is known.
 
     Raises:
         InputError: as `inverse_dynamics`, or a torque is not finite.
     """
-    return _loads(boom, trajectory, None, payload_as)[0].tau
+    return _loads(boom, trajectory, vehicle, payload_as)[0].tau
 
 
 def _loads(

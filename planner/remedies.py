@@ -1,6 +1,6 @@
 """What would mend a move that cannot be made: the smallest single change of each kind, verified by planning again."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -19,6 +19,11 @@ _COARSE = 0.05  # [s], the sampling step of a trial
 _BISECTIONS = 8
 
 
+Works = Callable[..., bool]
+Change = Callable[[Boom, Sequence[int], float], Boom]
+Track = Callable[[list[Any]], Iterable[Any]]
+
+
 @dataclass(frozen=True)
 class Remedy:
     """One change that makes the move possible, all else the same."""
@@ -28,7 +33,7 @@ class Remedy:
     sentence: str
 
 
-def remedies(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[Remedy, ...]:
+def remedies(boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any) -> tuple[Remedy, ...]:
     """The least change of each kind with which `plan(boom, start, goal, **options)` succeeds and no check FAILs.
 
     Payload (less), duration (longer), the gear ratio of one joint (higher, all else of the sheet unchanged), the drive of one
@@ -36,6 +41,10 @@ def remedies(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[R
     no single one helps), and the order of the joints (the extension first, or last). Factors are looked for up to 4 and
     rounded to the safe side; each is planned with before it is offered. Empty where no single change helps, and where nothing
     is wrong.
+
+    Args:
+        track: iterates over the kinds of change, and may show how far it is.
+        options: of `plan`.
     """
 
     def works(changed: Boom = boom, **other: Any) -> bool:
@@ -47,18 +56,15 @@ def remedies(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[R
     if works():
         return ()
     driven = [i for i, drive in enumerate(boom.drives) if drive is not None]
-    return (
-        *_payload(boom, works),
-        *_duration(boom, works, start, goal, options),
-        *_scaled(boom, works, "ratio", _geared, driven),
-        *_scaled(boom, works, "drive", _stronger, driven),
-        *_scaled(boom, works, "limit", _faster, range(5)),
-        *_orders(boom, works, start, goal, options),
-    )
-
-
-Works = Callable[..., bool]
-Change = Callable[[Boom, Sequence[int], float], Boom]
+    kinds: list[Callable[[], Iterator[Remedy]]] = [
+        partial(_payload, boom, works),
+        partial(_duration, boom, works, start, goal, options),
+        partial(_scaled, boom, works, "ratio", _geared, driven),
+        partial(_scaled, boom, works, "drive", _stronger, driven),
+        partial(_scaled, boom, works, "limit", _faster, range(5)),
+        partial(_orders, boom, works, start, goal, options),
+    ]
+    return tuple(remedy for kind in track(kinds) for remedy in kind())
 
 
 def _payload(boom: Boom, works: Works) -> Iterator[Remedy]:

@@ -143,10 +143,10 @@ def cells(row: Row) -> tuple[str, ...]:
     factor, unit = _for_people(row)
     if row.margin is None:
         margin = "-"
-    elif row.check in ANGLE_CHECKS:
+    elif row.check in ANGLE_CHECKS or row.joint == "arm":
         margin = f"{row.margin * factor:.4g} {unit}"
     else:
-        margin = f"{row.margin:.0%}"
+        margin = f"{round(row.margin, 2) + 0.0:.0%}"  # no -0%
     return (
         row.joint,
         row.check,
@@ -219,6 +219,15 @@ def assumptions(boom: Boom, jerk_limited: bool) -> tuple[str, ...]:
     for name, bearable in (("force", boom.mount.force), ("moment", boom.mount.moment)):
         if bearable is not None and bearable.origin.basis is Basis.ASSUMED:
             sentences.append(f"{name} that the mount bears, {bearable.value:g}: {bearable.origin.source}")
+    keep = boom.keep_out
+    if keep is not None:
+        if keep.origin.basis is Basis.ASSUMED:
+            lengths = (
+                f"clearance {keep.clearance:g} m, radius of links {keep.link_radius:g} m, of payload {keep.payload_radius:g} m"
+            )
+            sentences.append(f"{lengths}: {keep.origin.source}")
+        assumed = [shape for shape in keep.shapes if shape.origin.basis is Basis.ASSUMED]
+        sentences += [f"{shape.name} to keep away from: {shape.origin.source}" for shape in assumed]
     if limits.origins["transmission"][0].basis is Basis.ASSUMED:
         angle = np.degrees(limits.transmission)
         sentences.append(f"transmission angle warned of below {angle:g} deg: {limits.origins['transmission'][0].source}")

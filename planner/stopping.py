@@ -68,7 +68,7 @@ def stop(boom: Boom, motion: Motion, at: float, base: BaseMotion | None = None) 
     ruckig's velocity interface brings s(t) to rest with the hardest even limit on its deceleration (and jerk, where the
     motion's is limited) that keeps the limits on the way. On a curved path the curvature alone can take all of a joint's
     acceleration: where that makes the stop a quarter longer, or impossible, each joint brakes by itself, off the path. What is
-    longer than finishing the move is not used.
+    longer than finishing the move is not used. A boom with shapes to keep away from stops on its path.
 
     Raises:
         InputError: the moment is not within the motion.
@@ -108,7 +108,8 @@ def _stops(boom: Boom, motion: Motion, moments: Array, base: BaseMotion | None) 
     for i, (braked, _) in enumerate(found):
         if braked is not None and braked.duration < stops[i].duration:
             stops[i] = Stop(braked, Way.ON_PATH)
-    held_back = [i for i, (_, share) in enumerate(found) if share < 1.0]
+    # Off the path nobody knows what is in the way.
+    held_back = [i for i, (_, share) in enumerate(found) if share < 1.0 and boom.keep_out is None]
     for i, (braked, _) in zip(held_back, _hardest(boom, off_path, moments[held_back], base), strict=True):
         if braked is not None and braked.duration < _WORTH_LEAVING * stops[i].duration:
             stops[i] = Stop(braked, Way.OFF_PATH)

@@ -101,6 +101,7 @@ def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
     """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,)."""
     boom, zero = demands.boom, np.zeros_like(demands.s)
     at_rest, gears, inertias = motor_limits(boom, np.zeros(5)), gear_limits(boom), rotors(boom)
+    intercepts, slopes = demands.friction_tangent(x)
     columns = []
     for i, drive in enumerate(boom.drives):
         p1, p2, limit = demands.p1[:, i], demands.p2[:, i], boom.limits.acceleration[i]
@@ -109,9 +110,11 @@ def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
         if drive is None:
             continue
         tangent = drive_torque_tangent(drive, p1 * np.sqrt(x))
-        torques = [demands.c[:, i]] + ([demands.c[:, i] + demands.friction[:, i]] if demands.friction[:, i].any() else [])
-        for sign, held in product((1.0, -1.0), torques):
-            a, b, c = sign * demands.a[:, i], sign * demands.b[:, i], sign * held
+        torques = [(demands.b[:, i], demands.c[:, i])]
+        if intercepts[:, i].any():  # without friction as well: it earns no credit while braking
+            torques.append((demands.b[:, i] + slopes[:, i], demands.c[:, i] + intercepts[:, i]))
+        for sign, (carried, held) in product((1.0, -1.0), torques):
+            a, b, c = sign * demands.a[:, i], sign * carried, sign * held
             if np.isfinite(gears[i]):
                 columns.append((a / gears[i], b / gears[i], c / gears[i]))
             if np.isfinite(at_rest[i]):
