@@ -106,4 +106,4 @@ def test_a_load_that_no_drive_holds_is_broken_on_every_profile_that_plans_it():
         motions = timed(heavy, [JointLine(START, GOAL)], Timing.of(profile), None)
         broken = {each.limit: each for each in certify(heavy, motions).broken}
         assert broken["motor torque"].joint == "lower"
-        assert broken["motor torque"].ratio >= held(heavy, GOAL[None]) > 1.1
+        assert broken["motor torque"].ratio >= held(heavy, GOAL[None]) * (1.0 - 1e-12) > 1.1

@@ -106,7 +106,8 @@ def test_nothing_thin_is_missed_on_the_way():
     for _ in range(20):
         start, goal = (np.array([rng.uniform(0.0, 6.0), 0.5, 2.2, rng.uniform(0.0, 1.0), 0.0]) for _ in range(2))
         place = lines(start + rng.uniform(0.1, 0.9) * (goal - start))[5, 1] + rng.normal(0.0, 0.15, 3)
-        wire = Capsule("wire", place - [0.0, 0.0, 0.5], place + [0.0, 0.0, 0.5], 0.01, ORIGIN)
+        half = np.array([0.0, 0.0, 0.5])
+        wire = Capsule("wire", place - half, place + half, 0.01, ORIGIN)
         boom = with_shapes(wire, gap=0.02, link=0.02, payload=0.04)
         path = JointLine(start, goal)
         truly = distances(boom, path(np.linspace(0.0, 1.0, 3001))).min()
@@ -176,9 +177,9 @@ def test_other_paths_are_refused_and_not_led_round():
         InfeasibleError, match=r"at \d+\.\d% of the path the .* post, where 50 mm are to be kept; a path of this"
     ):
         plan(boom, *ROUND_POST, profile="quintic", via=[clear], stop_at_via=False)
-    with pytest.raises(InfeasibleError, match="target 2: the .* post"):
+    with pytest.raises(InfeasibleError, match=r"target 2: the .* post"):
         plan(boom, *ROUND_POST, profile="quintic", via=[via], stop_at_via=False)
-    across = TipTarget((2.0, 0.4, 0.5)), TipTarget((0.4, 2.0, 0.5))
+    across = TipTarget((2.0, 0.8, 0.5)), TipTarget((0.8, 2.0, 0.5))
     plan(BOOM, *across, along="line")
     with pytest.raises(InfeasibleError, match=r"of the path the .* runs into the post.*; a path of this kind is not led round"):
         plan(boom, *across, along="line")

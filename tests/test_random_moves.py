@@ -70,7 +70,7 @@ def degenerate():
         goal = middle.copy()
         goal[joint] += 0.4
         yield f"joint {joint} alone", BOOM, middle, goal
-    yield "from lower limits to upper", BOOM, LIMITS.lower + [0, 0, 0, 0, 0], LIMITS.upper
+    yield "from lower limits to upper", BOOM, LIMITS.lower, LIMITS.upper
     yield (
         "along the coupled limit",
         BOOM,

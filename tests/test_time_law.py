@@ -57,11 +57,12 @@ def test_motion_is_clipped_to_its_ends():
     np.testing.assert_array_equal(motion([-1.0, 3.0])[0], [START, GOAL])
 
 
+RAMP = 2.0 / 3.0  # of the trapezoid's acceleration, over 0.5 s, 1 s of cruise between
 LAWS = {
-    "trapezoid": TimeLaw.from_pieces([0.5, 1.0, 0.5], [[0.5 / 0.75, 0.0, -0.5 / 0.75], [0.0, 1.0 / 1.5, 1.0 / 1.5], [0.0, 1.0 / 6.0, 5.0 / 6.0]]),
+    "trapezoid": TimeLaw.from_pieces([0.5, 1.0, 0.5], [[RAMP, 0.0, -RAMP], [0.0, RAMP, RAMP], [0.0, 1.0 / 6.0, 5.0 / 6.0]]),
     "cubic": cubic_law(1.7),
     "triangle": TimeLaw.from_pieces([1.0, 1.0], [[0.5, -0.5], [0.0, 1.0], [0.0, 0.5]]),
-}  # fmt: skip
+}
 
 
 def held_at_ends(law: TimeLaw, t):
@@ -135,7 +136,7 @@ def test_law_on_other_breaks_is_the_same_and_rests_after_its_end(name):
 
 def test_times_see_both_sides_of_a_jump():
     law = LAWS["trapezoid"]
-    a = 0.5 / 0.75 * 2.0
+    a = 2.0 * RAMP
     at = law.times(3)
     assert len(at) == 3 * 3 + 1
     np.testing.assert_allclose(at, [0, 0.25, 0.5, 0.5, 1.0, 1.5, 1.5, 1.75, 2.0, 2.0], rtol=0, atol=1e-11)
