@@ -97,6 +97,10 @@ def plan(
         InputError: an input is malformed or not finite.
         InfeasibleError: a target is out of reach or outside the limits, the duration is too short, something to be kept
             away from is in the way, or no motion keeps the drives' limits.
+
+    >>> move = plan(Boom.load(), "transport", "phenotyping", profile="time-optimal")
+    >>> round(move.report.duration, 3), str(move.report.verdict)
+    (4.333, 'INCOMPLETE')
     """
     if via_velocities is not None:
         stop_at_via = False
