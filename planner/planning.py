@@ -57,17 +57,18 @@ class Profile(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A planned move, its loads, and what the checks say of it."""
+    """A move, its loads, and what the checks say of it."""
 
     boom: Boom
-    profile: Profile
+    profile: str
+    """A `Profile`, or what a motion from elsewhere is called."""
     trajectory: Trajectory
     loads: Loads
     parts: Breakdown
     """The torques' breakdown, friction included."""
     report: Report
     motions: tuple[Motion, ...]
-    """The continuous motions behind the samples, from stop to stop; none of an empty move."""
+    """The continuous motions behind a plan's samples, from stop to stop; none of an empty move, or of a motion from elsewhere."""
     vehicle: VehicleCase | None = None
 
 
@@ -176,9 +177,21 @@ def check(
         vehicle: what the vehicle does meanwhile; None rests on level ground.
         profile: what the report calls the motion.
     """
+    return examine(boom, trajectory, payload_as=payload_as, vehicle=vehicle, profile=profile).report
+
+
+def examine(
+    boom: Boom,
+    trajectory: Trajectory,
+    *,
+    payload_as: PayloadAs = "mass",
+    vehicle: VehicleCase | None = None,
+    profile: str = "recorded",
+) -> Move:
+    """Any motion with its loads and its checks, as `write_recording` takes it; for the arguments see `check`."""
     loads, parts, base = _loads(boom, trajectory, vehicle, payload_as)
     shock = None if vehicle is None or vehicle.peak == 0.0 else _shock(boom, trajectory, vehicle, payload_as)
-    return Report(
+    report = Report(
         profile=str(profile),
         duration=trajectory.duration,
         rows=check_rows(
@@ -194,6 +207,7 @@ def check(
         assumptions=assumptions(boom, trajectory.qddd is not None),
         peaks=torque_peaks(trajectory.t, parts),
     )
+    return Move(boom, str(profile), trajectory, loads, parts, report, (), vehicle)
 
 
 def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass") -> Array:

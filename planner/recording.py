@@ -24,7 +24,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from scipy.spatial.transform import Rotation
 
-from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms
+from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms, forward_kinematics
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from boom_model.drives import drive_inertia, drive_torque_limit
@@ -54,6 +54,9 @@ PIN_COLOR: Color = (60, 60, 60)
 PAYLOAD_COLOR: Color = (230, 230, 230)
 OUTSIDE_COLOR: Color = (90, 90, 90)
 
+_POSES_AT_ONCE = 20_000
+"""Samples whose poses are in memory together; each takes some 3 kB there, and 0.5 kB in the file."""
+
 _STEEL = 7850.0  # [kg/m^3]: the payload is shown as a ball of steel
 
 
@@ -67,7 +70,6 @@ def write_recording(path: str | Path, move: Move) -> None:
         InputError: the file cannot be written; an old one is left as it was.
     """
     boom, trajectory, loads, report = move.boom, move.trajectory, move.loads, move.report
-    poses = body_transforms(boom, trajectory.q)
     plots = _plots(boom, trajectory, loads)
     bundles = _bundles(move)
 
@@ -75,7 +77,7 @@ def write_recording(path: str | Path, move: Move) -> None:
         recording.send_blueprint(_blueprint(_eye(boom, trajectory.q), plots, bundles))
         recording.log("report", rr.TextDocument(report.to_markdown(), media_type="text/markdown"), static=True)
         _log_solids(recording, boom)
-        _log_motion(recording, trajectory.t, poses, move.vehicle)
+        _log_motion(recording, boom, trajectory.t, trajectory.q, move.vehicle)
         for plot in (plot for tab in plots.values() for plot in tab):
             _log_plot(recording, trajectory.t, plot)
         for bundle in (bundle for tab in bundles.values() for bundle in tab):
@@ -116,7 +118,7 @@ def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> 
         recording.send_blueprint(_shown_beside(view, text, [3, 1]))
         recording.log("reading", rr.TextDocument(reading.replace("\n", "\n\n"), media_type="text/markdown"), static=True)
         _log_solids(recording, boom)
-        _log_motion(recording, np.zeros(1), body_transforms(boom, q[None]), None)
+        _log_motion(recording, boom, np.zeros(1), q[None], None)
         _log_reach(recording, reach_map, cells, half)
 
     with replacing(path) as temporary:
@@ -172,7 +174,7 @@ def _time(t: Array) -> rr.TimeColumn:
 # The linkage
 
 
-def _log_motion(recording: rr.RecordingStream, t: Array, poses: Mapping[str, Array], vehicle: VehicleCase | None) -> None:
+def _log_motion(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, vehicle: VehicleCase | None) -> None:
     def log(entity: str, T: Array, parent: str, child: str, times: Array) -> None:
         motion = rr.Transform3D.columns(
             translation=T[:, :3, 3],
@@ -186,9 +188,11 @@ def _log_motion(recording: rr.RecordingStream, t: Array, poses: Mapping[str, Arr
         log("world/mount", np.eye(4)[None], "tf#/world", "mount", t[:1])
     else:
         log("world/mount", base_pose(vehicle, t), "tf#/world", "mount", t)
-    for name, T in poses.items():
-        log(f"world/boom/{name}", T, "mount", name, t)
-    path = rr.LineStrips3D([poses["tip"][:, :3, 3]], colors=[PAYLOAD_COLOR], radii=[0.004])
+    for start in range(0, len(t), _POSES_AT_ONCE):
+        part = slice(start, start + _POSES_AT_ONCE)
+        for name, T in body_transforms(boom, q[part]).items():
+            log(f"world/boom/{name}", T, "mount", name, t[part])
+    path = rr.LineStrips3D([forward_kinematics(boom, q).position], colors=[PAYLOAD_COLOR], radii=[0.004])
     recording.log("world/tip_path", path, rr.CoordinateFrame("mount"), static=True)
 
 
@@ -437,7 +441,8 @@ def _plot_view(plot: _Plot) -> rrb.TimeSeriesView:
 
 def _eye(boom: Boom, q: Array) -> rrb.EyeControls3D:
     """From the boom's right at the middle of its move, a little from above, and far enough off to see all of it."""
-    points = frame_transforms(boom, q, "outer")[..., :3, 3].reshape(-1, 3)
+    some = q[:: max(1, len(q) // 1000)]
+    points = frame_transforms(boom, some, "outer")[..., :3, 3].reshape(-1, 3)
     return _eye_on(points, float(q[len(q) // 2, 0]))
 
 
