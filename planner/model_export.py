@@ -146,8 +146,9 @@ def mjcf(boom: Boom) -> str:
 # The tree
 
 
-def _axes(x: ArrayLike, y: ArrayLike) -> Array:
-    return np.column_stack([x, y, np.cross(x, y)]).astype(float)
+def _axes(x: tuple[int, int, int], y: tuple[int, int, int]) -> Array:
+    axes = np.array([x, y, np.cross(x, y)], dtype=float)
+    return axes.T
 
 
 _HERE = (0.0, 0.0, 0.0)
@@ -218,11 +219,9 @@ def _range(boom: Boom, row: tuple[float, ...]) -> tuple[float, float]:
     """Of the coordinate row . q within the position limits, the linkage's coupled one included."""
     ends = np.array(row) * np.stack([boom.limits.lower, boom.limits.upper])
     low, high = float(ends.min(axis=0).sum()), float(ends.max(axis=0).sum())
-    gap = boom.limits.linkage
-    if row == (0, -1, 1, 0, 0):
-        low = max(low, gap)
-    elif row == (0, 1, -1, 0, 0):
-        high = min(high, -gap)
+    if row[1] * row[2] < 0.0:  # between the two link directions
+        gap = boom.limits.linkage
+        return (max(low, gap), high) if row[2] > 0.0 else (low, min(high, -gap))
     return low, high
 
 
@@ -361,9 +360,7 @@ def _mjcf_body(element: Element, boom: Boom, link: _Link) -> None:
             }
             own = {key: _text(value) for key, value in numbers.items() if value > 0.0}
         kind = "slide" if link.joint == "extension" else "hinge"
-        SubElement(
-            element, "joint", own, name=link.joint, type=kind, axis="0 0 1", range=_text(_range(boom, link.row))
-        )
+        SubElement(element, "joint", own, name=link.joint, type=kind, axis="0 0 1", range=_text(_range(boom, link.row)))
     body = _body(boom, link.name)
     if body is not None and body.mass > 0.0:
         # MuJoCo diagonalises a full tensor, which it wants positive

@@ -12,7 +12,6 @@ from boom_model.boom import IS_LENGTH, JOINTS
 from boom_model.errors import InputError
 from planner.files import replacing
 from planner.trajectory import (
-    COLUMNS,
     TORQUES,
     Trajectory,
     csv_table,
@@ -32,7 +31,7 @@ _PER = {"q": "", "qd": "/s", "qdd": "/s^2"}
 UNITS = {"t": "s"} | {
     f"{name}{i + 1}": f"{'m' if IS_LENGTH[i] else 'rad'}{per}" for name, per in _PER.items() for i in range(5)
 } | {name: "N" if length else "Nm" for name, length in zip(TORQUES, IS_LENGTH, strict=True)}  # fmt: skip
-"""Unit of each column of COLUMNS and TORQUES."""
+"""Unit of each column of a motion."""
 
 _ROWS = 20_000  # turned into text at once
 
@@ -134,9 +133,9 @@ def _parquet_table(path: str | Path) -> "tuple[pa.Table, tuple[str, ...]]":
 def write_joint_trajectory(trajectory: Trajectory, path: str | Path, tau: Array | None = None) -> None:
     """The motion as ROS's trajectory_msgs/JointTrajectory: YAML, or JSON where the file's name ends with .json.
 
-    Joint names are those of `JOINTS`, which the URDF has too; its extension is in m and N. A point's time_from_start counts from
-    the first sample, to the nanosecond. The header's stamp is 0, which starts a motion when it arrives, and its frame is
-    the URDF's root, "mount".
+    Joint names are those of `JOINTS`, which the URDF has too; the extension is in m and N. A point's time_from_start counts
+    from the first sample, to the nanosecond. The header's stamp is 0, which starts a motion when it arrives, and its frame is
+    "mount", the URDF's root.
 
     A point a line, as both forms take it: a YAML library needs some 0.5 ms for a point.
 

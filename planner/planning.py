@@ -68,7 +68,7 @@ class Move:
     """The torques' breakdown, friction included."""
     report: Report
     motions: tuple[Motion, ...]
-    """The continuous motions behind a plan's samples, from stop to stop; none of an empty move, or of a motion from elsewhere."""
+    """The continuous motions behind a plan's samples, from stop to stop; none of an empty move or a motion from elsewhere."""
     vehicle: VehicleCase | None = None
 
 

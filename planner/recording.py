@@ -18,6 +18,7 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import rerun as rr
@@ -30,6 +31,7 @@ from boom_model.boom import IS_LENGTH
 from boom_model.drives import drive_inertia, drive_torque_limit
 from boom_model.frames import R_LINK_BODY, frame_transforms
 from boom_model.reach import ReachMap
+from planner.comparison import Comparison
 from planner.files import replacing
 from planner.planning import Move
 from planner.reach_picture import margin_colors, margin_range, reach_title, reference_pose
@@ -85,6 +87,38 @@ def write_recording(path: str | Path, move: Move) -> None:
 
     with replacing(path) as temporary:
         Path(temporary).write_bytes(_encoded(f"{boom.name}: {report.profile}, {report.duration:.3f} s", log))
+
+
+def write_comparison_recording(path: str | Path, comparison: Comparison) -> None:
+    """Writes a measured motion over its plan, with its blueprint. The entities are those of a move, but that
+
+    /world/boom             is the measured motion, solid, and /world/tip_path its tip's
+    /world/planned          is the planned one, its edges alone; frames "planned <body>" in "mount"; and its tip's path
+    /plots/<quantity>/<joint>   q and tau hold both, tau the measured torques too where the log has them
+    /plots/error/<joint>    measured less planned, in deg and m; /plots/error/tip the distance of the tips [mm]
+
+    Args:
+        path: the .rrd file.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    boom, t = comparison.boom, comparison.planned.t
+    tabs = _comparison_bundles(comparison)
+
+    def log(recording: rr.RecordingStream) -> None:
+        recording.send_blueprint(_blueprint(_eye(boom, comparison.planned.q), {}, tabs))
+        notes = "\n".join(f"- {note}" for note in (COMPARISON_LEGEND, *comparison.measured.notes))
+        recording.log("report", rr.TextDocument(notes, media_type="text/markdown"), static=True)
+        _log_solids(recording, boom)
+        _log_solids(recording, boom, ghost=True)
+        _log_motion(recording, boom, t, comparison.measured.q, None)
+        _log_motion(recording, boom, t, comparison.planned.q, None, ghost=True)
+        for bundle in (bundle for tab in tabs.values() for bundle in tab):
+            _log_bundle(recording, t, bundle)
+
+    with replacing(path) as temporary:
+        Path(temporary).write_bytes(_encoded(f"{boom.name}: measured and planned", log))
 
 
 def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> None:
@@ -174,7 +208,11 @@ def _time(t: Array) -> rr.TimeColumn:
 # The linkage
 
 
-def _log_motion(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, vehicle: VehicleCase | None) -> None:
+def _log_motion(
+    recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, vehicle: VehicleCase | None, ghost: bool = False
+) -> None:
+    place, prefix, color = ("planned", "planned ", LIMIT_COLOR) if ghost else ("boom", "", PAYLOAD_COLOR)
+
     def log(entity: str, T: Array, parent: str, child: str, times: Array) -> None:
         motion = rr.Transform3D.columns(
             translation=T[:, :3, 3],
@@ -191,12 +229,16 @@ def _log_motion(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, v
     for start in range(0, len(t), _POSES_AT_ONCE):
         part = slice(start, start + _POSES_AT_ONCE)
         for name, T in body_transforms(boom, q[part]).items():
-            log(f"world/boom/{name}", T, "mount", name, t[part])
-    path = rr.LineStrips3D([forward_kinematics(boom, q).position], colors=[PAYLOAD_COLOR], radii=[0.004])
-    recording.log("world/tip_path", path, rr.CoordinateFrame("mount"), static=True)
+            log(f"world/{place}/{name}", T, "mount", f"{prefix}{name}", t[part])
+    path = rr.LineStrips3D([forward_kinematics(boom, q).position], colors=[color], radii=[0.004])
+    recording.log("world/planned/tip_path" if ghost else "world/tip_path", path, rr.CoordinateFrame("mount"), static=True)
 
 
-def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
+def _log_solids(recording: rr.RecordingStream, boom: Boom, ghost: bool = False) -> None:
+    """The solids of the boom, or the edges alone of a second one's: "planned" stands before the names of its frames."""
+    place, prefix = ("planned", "planned ") if ghost else ("boom", "")
+    fill: Literal["solid", "majorwireframe"] = "majorwireframe" if ghost else "solid"
+
     def log(name: str, shape: rr.Boxes3D | rr.Cylinders3D | rr.Points3D, frame: str | None = None) -> None:
         recording.log(name, shape, *([] if frame is None else [rr.CoordinateFrame(frame)]), static=True)
 
@@ -205,7 +247,9 @@ def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
     for name, bars in _bars(boom).items():
         R = R_LINK_BODY[name]
         low, high = (np.array([corner(bar) for bar in bars]) @ R for corner in (_Bar.low, _Bar.high))
-        log(f"world/boom/{name}", _boxes(low, high, COLORS[name]), name)
+        log(f"world/{place}/{name}", _boxes(low, high, COLORS[name], fill), f"{prefix}{name}")
+    if ghost:
+        return
     for name, along in _pins(boom).items():
         centers = np.array([(e, 0.0, 0.0) for e in along]) @ R_LINK_BODY[name]
         # A cylinder lies along z, and these bodies' z is the pins' direction n.
@@ -216,9 +260,9 @@ def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
         log("world/boom/tip", rr.Points3D([(0.0, 0.0, 0.0)], radii=radius, colors=PAYLOAD_COLOR), "tip")
 
 
-def _boxes(low: Array, high: Array, color: Color) -> rr.Boxes3D:
-    """Solid boxes between opposite corners, (boxes, 3) each."""
-    return rr.Boxes3D(centers=(low + high) / 2.0, half_sizes=np.abs(high - low) / 2.0, colors=color, fill_mode="solid")
+def _boxes(low: Array, high: Array, color: Color, fill: Literal["solid", "majorwireframe"] = "solid") -> rr.Boxes3D:
+    """Boxes between opposite corners, (boxes, 3) each."""
+    return rr.Boxes3D(centers=(low + high) / 2.0, half_sizes=np.abs(high - low) / 2.0, colors=color, fill_mode=fill)
 
 
 @dataclass(frozen=True)
@@ -400,6 +444,32 @@ def _bundles(move: Move) -> dict[str, list[_Bundle]]:
             title = f"{kind} on the mount [{unit}]"
             curves = [f"{name} [{unit}]" for name in names]
             tabs["Mount"].append(_Bundle(f"plots/mount/{kind}", title, curves, colors, np.stack(series, axis=-1)))
+    return tabs
+
+
+COMPARISON_LEGEND = "Solid bodies and the light path: measured. Edges and the orange path: planned."
+
+
+def _comparison_bundles(c: Comparison) -> dict[str, list[_Bundle]]:
+    tabs: dict[str, list[_Bundle]] = {"Errors": [], "Torques": [], "Positions": []}
+    millimetres = c.tip_error[:, None] * 1e3
+    tabs["Errors"].append(_Bundle("plots/error/tip", "distance of the tips [mm]", ["distance [mm]"], [PAYLOAD_COLOR], millimetres))
+    for i, joint in enumerate(JOINTS):
+        unit, force = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
+        color, pair = JOINT_COLORS[joint], ["planned", "measured"]
+        both = [LIMIT_COLOR, color]
+        positions = np.stack([_for_people(i, motion.q[:, i]) for motion in (c.planned, c.measured)], axis=-1)
+        tabs["Positions"].append(_Bundle(f"plots/q/{joint}", f"{joint} position [{unit}]", pair, both, positions))
+        error = _for_people(i, c.joint_error[:, i, None])
+        title = f"{joint}: measured less planned [{unit}]"
+        tabs["Errors"].append(_Bundle(f"plots/error/{joint}", title, ["measured less planned"], [color], error))
+        names, colors, torques = ["planned", "measured motion, by the model"], both, [c.tau_planned, c.tau_measured]
+        if c.tau_logged is not None:
+            names, colors = [*names, "measured"], [*both, PAYLOAD_COLOR]
+            torques.append(c.tau_logged)
+        values = np.stack([tau[:, i] for tau in torques], axis=-1)
+        name = "force" if IS_LENGTH[i] else "torque"
+        tabs["Torques"].append(_Bundle(f"plots/tau/{joint}", f"{joint} {name} [{force}]", names, colors, values))
     return tabs
 
 

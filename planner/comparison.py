@@ -1,0 +1,389 @@
+"""A measured motion beside its plan: joint and tip errors, and the torques of both.
+
+A log holds positions, and it may hold velocities, accelerations and torques. Encoders are noisy, and differentiating twice
+amplifies the noise of a step h by some 1/h^2. What a log lacks is therefore taken from a Savitzky-Golay filter: a cubic is
+fitted to the samples of a window about each sample, and its derivatives in the middle are the motion's. That assumes that
+the motion is a cubic within any window, and that the noise of a sample has nothing to do with that of the next. Then the
+filter, a weighted sum with weights w, makes noise of standard deviation sigma into one of
+
+    sigma sqrt(sum w^2),    about sigma sqrt(720 / N^5) / h^2 for accelerations from N positions,
+
+and the torques have M(q) times that. A wider window passes less noise and rounds off more of the motion.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model import JOINTS, Boom, InputError, forward_kinematics, mass_matrix
+from boom_model.arrays import Array, Mask, checked, read_only, scalar
+from boom_model.boom import IS_LENGTH
+from boom_model.dynamics import PayloadAs
+from planner.motion_files import read_quantities
+from planner.planning import torques
+from planner.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
+
+WINDOW = 0.2
+"""Default width of the smoothing window [s]; our own choice: a twentieth of the main move."""
+
+_ORDER = 3
+_EVEN = 0.01  # steps that differ by less than this share count as even
+_LOOKED_AT = 2_000  # samples of a log that its alignment looks at, and shifts that it tries
+_MASSES = 200  # samples at which the torques' noise is worked out
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A measured motion at times t (n,), in rad, m and s; each of the rest (n, 5), None where it was not measured."""
+
+    t: Array
+    q: Array
+    qd: Array | None = None
+    qdd: Array | None = None
+    tau: Array | None = None
+    """At the joints, behind the gearboxes [Nm, the extension's N]."""
+    notes: tuple[str, ...] = ()
+
+    @staticmethod
+    def of(
+        t: ArrayLike,
+        q: ArrayLike,
+        qd: ArrayLike | None = None,
+        qdd: ArrayLike | None = None,
+        tau: ArrayLike | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> "Log":
+        """A log from arrays, checked.
+
+        Raises:
+            InputError: not finite, shapes that do not match, no sample, or times that do not increase.
+        """
+        some = {"qd": qd, "qdd": qdd, "tau": tau}
+        given = {name: checked(name, values, 5) for name, values in some.items() if values is not None}
+        plain = Trajectory.from_samples(t, q, np.zeros(np.shape(q)), np.zeros(np.shape(q)))
+        for name, values in given.items():
+            if values.shape != plain.q.shape:
+                raise InputError(f"{name} has shape {values.shape}; with {plain.t.size} times it must be {plain.q.shape}")
+        return Log(plain.t, plain.q, notes=notes, **{name: read_only(values) for name, values in given.items()})
+
+
+def read_log(path: str | Path) -> Log:
+    """A log from CSV or Parquet: t, q1..q5, and any of qd1..qd5, qdd1..qdd5 and tau1..tau5.
+
+    Raises:
+        InputError: as `read_motion`, but that qd may stand without qdd.
+    """
+    data, notes = read_quantities(path)
+    try:
+        return Log.of(**data, notes=notes)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """A log with the derivatives that it lacks."""
+
+    trajectory: Trajectory
+    """Positions are the log's own; its notes say what was done."""
+    tau: Array | None
+    """The log's."""
+    noise: Array
+    """(5,) standard deviation of the positions' noise, by what the filter takes off [rad, m]"""
+    acceleration_noise: Array
+    """(5,) standard deviation that is left in qdd [rad/s^2, m/s^2]; 0 where the log has its accelerations"""
+    inside: Mask
+    """(n,) True where the whole window lies in the log; towards its ends the filter's derivatives are worse"""
+
+
+def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
+    """The log with its derivatives: those that it has, as they are; velocities from its positions, and accelerations from its
+    velocities or else from its positions, by a cubic Savitzky-Golay filter over `window` seconds.
+
+    A log whose steps differ by more than 1 % is first read off at even ones, along straight lines.
+
+    Raises:
+        InputError: the window is not a positive number, holds less than 5 samples or more than the log has, or is shorter than
+            a gap in the log.
+    """
+    from scipy.signal import savgol_coeffs, savgol_filter
+
+    window = scalar("window", window)
+    if not window > 0.0:
+        raise InputError(f"window is {window:g} s; it must be above 0 s")
+    log = _even(log, window)
+    n = log.t.size
+    h = float(log.t[-1] - log.t[0]) / max(n - 1, 1)
+    N = 2 * round(min(0.5 * window / h, n)) + 1 if h > 0.0 else 1
+    if N < _ORDER + 2:
+        raise InputError(f"a window of {window:g} s holds {N} samples of a log with steps of {h:g} s; it must hold 5 at least")
+    if n < N:
+        raise InputError(f"the log has {n} samples; a window of {window:g} s needs {N}")
+
+    def derivative(values: Array, order: int) -> Array:
+        found: Array = savgol_filter(values, N, _ORDER, deriv=order, delta=h, axis=0)
+        return found
+
+    def spread(values: Array) -> Array:
+        kept = float(savgol_coeffs(N, _ORDER)[N // 2])  # of its own noise, which a smoothed sample keeps
+        removed = (values - derivative(values, 0))[inside]
+        rms: Array = np.sqrt(np.mean(removed**2, axis=0) / (1.0 - kept))
+        return rms
+
+    inside = np.zeros(n, dtype=bool)
+    inside[N // 2 : n - N // 2] = True
+    noise, by_filter = spread(log.q), f"by a cubic Savitzky-Golay filter over {N} samples, {(N - 1) * h:.4g} s"
+    notes, qd, qdd, left = list(log.notes), log.qd, log.qdd, np.zeros(5)
+    if qd is None:
+        qd = derivative(log.q, 1)
+        notes.append(f"velocities are not in the log: taken from its positions {by_filter}")
+    if qdd is None:
+        source, order, values = ("positions", 2, log.q) if log.qd is None else ("velocities", 1, log.qd)
+        qdd = derivative(values, order)
+        left = spread(values) * np.linalg.norm(savgol_coeffs(N, _ORDER, deriv=order, delta=h))
+        notes.append(f"accelerations are not in the log: taken from its {source} {by_filter}")
+    if log.qd is not None and log.qdd is not None:
+        inside[:] = True
+    trajectory = Trajectory.from_samples(log.t, log.q, qd, qdd, notes=tuple(notes))
+    return Smoothed(trajectory, log.tau, noise, left, inside)
+
+
+def _even(log: Log, window: float) -> Log:
+    steps = np.diff(log.t)
+    if not steps.size or np.ptp(steps) <= _EVEN * steps.mean():
+        return log
+    if steps.max() > window:
+        at = int(steps.argmax())
+        raise InputError(
+            f"the log has a gap of {steps[at]:g} s after t = {log.t[at]:g} s, longer than the window of {window:g} s"
+        )
+    t = np.linspace(log.t[0], log.t[-1], log.t.size)
+
+    given = {name: values for name in ("q", "qd", "qdd", "tau") if (values := getattr(log, name)) is not None}
+    read = {name: np.stack([np.interp(t, log.t, column) for column in values.T], axis=-1) for name, values in given.items()}
+    note = f"the log's steps, {steps.min():.4g} s to {steps.max():.4g} s, are not even: read off every {steps.mean():.4g} s"
+    return Log(t, notes=(*log.notes, note), **read)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A plan and a log of it at common times: the log's, where the plan has something to say."""
+
+    boom: Boom
+    planned: Trajectory
+    """The plan at the common times, which count as its own do."""
+    measured: Trajectory
+    """The log at them, with its derivatives."""
+    offset: float
+    """What was added to the log's times [s]."""
+    best_offset: float
+    """The offset that makes the sum of the squared joint errors least, each joint as a share of its range [s]."""
+    tau_planned: Array
+    """(n, 5) by the model, of the plan"""
+    tau_measured: Array
+    """(n, 5) by the model, of the measured motion"""
+    tau_logged: Array | None
+    """(n, 5) as measured"""
+    tip_planned: Array
+    """(n, 3) in frame 1 [m]"""
+    tip_measured: Array
+    """(n, 3)"""
+    noise: Array
+    """(5,) of the log's positions, see `Smoothed`"""
+    torque_noise: Array
+    """(5,) standard deviation that the log's noise leaves in tau_measured: what differs by less may be noise"""
+    inside: Mask
+    """(n,) where tau_measured is as good as that; its peaks and means are taken there"""
+
+    @property
+    def joint_error(self) -> Array:
+        """Measured less planned, (n, 5)."""
+        return self.measured.q - self.planned.q
+
+    @property
+    def tip_error(self) -> Array:
+        """Distance of the two tips, (n,) [m]."""
+        error: Array = np.linalg.norm(self.tip_measured - self.tip_planned, axis=-1)
+        return error
+
+    def to_json(self, files: dict[str, str]) -> dict[str, Any]:
+        """The JSON object of `boom compare`, in SI."""
+        t, tip = self.planned.t, self.tip_error
+        at = int(tip.argmax())
+        everywhere = np.ones(len(t), dtype=bool)
+        joints = []
+        for i, joint in enumerate(JOINTS):
+            torque: dict[str, Any] = {
+                "unit": "N" if IS_LENGTH[i] else "Nm",
+                "noise": float(self.torque_noise[i]),
+                "measured_less_planned": _extremes(t, (self.tau_measured - self.tau_planned)[:, i], self.inside),
+                "logged_less_measured": None,
+            }
+            if self.tau_logged is not None:
+                torque["logged_less_measured"] = _extremes(t, (self.tau_logged - self.tau_measured)[:, i], self.inside)
+            position = {"unit": "m" if IS_LENGTH[i] else "rad", "noise": float(self.noise[i])}
+            error = _extremes(t, self.joint_error[:, i], everywhere)
+            joints.append({"joint": joint, "position": position | {"error": error}, "torque": torque})
+        return {
+            "offset_s": self.offset,
+            "best_offset_s": self.best_offset,
+            "samples": len(t),
+            "from_s": float(t[0]),
+            "to_s": float(t[-1]),
+            "tip": {
+                "peak_m": float(tip[at]),
+                "at_s": float(t[at]),
+                "planned_m": self.tip_planned[at].tolist(),
+                "measured_m": self.tip_measured[at].tolist(),
+                "rms_m": float(np.sqrt(np.mean(tip**2))),
+                "mean_m": (self.tip_measured - self.tip_planned).mean(axis=0).tolist(),
+            },
+            "joints": joints,
+            "notes": list(self.measured.notes),
+            "files": files,
+        }
+
+
+def compare(
+    boom: Boom,
+    planned: Trajectory,
+    log: Log,
+    *,
+    offset: float | None = 0.0,
+    window: float = WINDOW,
+    payload_as: PayloadAs = "mass",
+) -> Comparison:
+    """Plan and log at the log's times, as far as the plan goes.
+
+    The plan is interpolated: q by the cubic through its positions and velocities, qd by its derivative, qdd along straight
+    lines.
+    Torques are those of `torques`: on level ground, with friction where it is known, without the drives' own inertia.
+
+    Args:
+        offset: added to the log's times [s]; None takes the one that fits best, which also takes away a delay of the drives.
+        window: see `smoothed`.
+        payload_as: see `inverse_dynamics`.
+
+    Raises:
+        InputError: as `smoothed`; the plan has a single sample; or log and plan have no two samples in common.
+    """
+    if planned.t.size < 2:
+        raise InputError("the plan has a single sample; a comparison needs a motion")
+    ready = smoothed(log, window)
+    curve = _curve(planned)
+    best = _best_offset(boom, planned, curve, ready.trajectory)
+    offset = best if offset is None else scalar("offset", offset)
+    t = ready.trajectory.t + offset
+    common = (t >= planned.t[0]) & (t <= planned.t[-1])
+    if common.sum() < 2:
+        raise InputError(
+            f"the log, from {t[0]:g} to {t[-1]:g} s with its offset of {offset:g} s, and the plan, from {planned.t[0]:g} to "
+            f"{planned.t[-1]:g} s, have no two samples in common; the offset that fits best is {best:g} s"
+        )
+    t = t[common]
+    qdd = np.stack([np.interp(t, planned.t, column) for column in planned.qdd.T], axis=-1)
+    plan = Trajectory.from_samples(t, curve(t), curve(t, 1), qdd, notes=planned.notes)
+    source = ready.trajectory
+    measured = Trajectory.from_samples(t, source.q[common], source.qd[common], source.qdd[common], notes=source.notes)
+    return Comparison(
+        boom=boom,
+        planned=plan,
+        measured=measured,
+        offset=offset,
+        best_offset=best,
+        tau_planned=torques(boom, plan, payload_as),
+        tau_measured=torques(boom, measured, payload_as),
+        tau_logged=None if ready.tau is None else ready.tau[common],
+        tip_planned=forward_kinematics(boom, plan.q).position,
+        tip_measured=forward_kinematics(boom, measured.q).position,
+        noise=ready.noise,
+        torque_noise=_torque_noise(boom, plan.q, ready.acceleration_noise, payload_as),
+        inside=ready.inside[common],
+    )
+
+
+POSITION_HEADER = ("joint", "largest error", "at", "RMS", "mean", "noise")
+TORQUE_HEADER = ("joint", "largest difference", "at", "RMS", "noise", "log: largest", "at", "RMS")
+
+
+def position_cells(joint: dict[str, Any]) -> tuple[str, ...]:
+    """A joint of `Comparison.to_json` for people, under POSITION_HEADER."""
+    position = joint["position"]
+    error = position["error"]
+    factor, unit = (1e3, "mm") if position["unit"] == "m" else (180.0 / np.pi, "deg")
+    shown = [f"{value * factor:.4g} {unit}" for value in (error["peak"], error["rms"], error["mean"], position["noise"])]
+    return joint["joint"], shown[0], f"{error['at_s']:.3f} s", *shown[1:]
+
+
+def torque_cells(joint: dict[str, Any]) -> tuple[str, ...]:
+    """A joint of `Comparison.to_json` for people, under TORQUE_HEADER."""
+    torque = joint["torque"]
+
+    def shown(found: dict[str, float | None] | None) -> tuple[str, str, str]:
+        if found is None or found["peak"] is None:
+            return "-", "-", "-"
+        return f"{found['peak']:.4g} {torque['unit']}", f"{found['at_s']:.3f} s", f"{found['rms']:.4g} {torque['unit']}"
+
+    noise = f"{torque['noise']:.3g} {torque['unit']}"
+    return joint["joint"], *shown(torque["measured_less_planned"]), noise, *shown(torque["logged_less_measured"])
+
+
+def summary(answer: dict[str, Any]) -> list[str]:
+    """`Comparison.to_json` in sentences: when, and where the tip was."""
+    tip = answer["tip"]
+    where = ", ".join(f"{x:.3f}" for x in tip["planned_m"])
+    return [
+        f"{answer['samples']} samples from {answer['from_s']:.3f} to {answer['to_s']:.3f} s; the log's times have "
+        f"{answer['offset_s']:.4f} s added, and {answer['best_offset_s']:.4f} s would fit best",
+        f"tip: up to {tip['peak_m'] * 1e3:.2f} mm off, at {tip['at_s']:.3f} s where ({where}) m was planned; "
+        f"RMS {tip['rms_m'] * 1e3:.2f} mm",
+    ]
+
+
+def _curve(planned: Trajectory) -> "CubicHermiteSpline":
+    from scipy.interpolate import CubicHermiteSpline
+
+    return CubicHermiteSpline(planned.t, planned.q, planned.qd)
+
+
+def _best_offset(boom: Boom, planned: Trajectory, curve: "CubicHermiteSpline", measured: Trajectory) -> float:
+    """The least of the sum of squared errors, each joint as a share of its range; the plan rests before and after itself."""
+    from scipy.optimize import minimize_scalar
+
+    some = slice(None, None, max(1, measured.t.size // _LOOKED_AT))
+    t, q = measured.t[some], measured.q[some]
+    weight = 1.0 / np.maximum(boom.limits.upper - boom.limits.lower, 1e-9)
+
+    def cost(offset: float) -> float:
+        error = (q - curve(np.clip(t + offset, planned.t[0], planned.t[-1]))) * weight
+        return float(np.sum(error**2))
+
+    shifts = np.linspace(planned.t[0] - t[-1], planned.t[-1] - t[0], _LOOKED_AT)
+    coarse = shifts[np.argmin([cost(shift) for shift in shifts])]
+    step = float(shifts[1] - shifts[0])
+    found = minimize_scalar(cost, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": 1e-9})
+    return float(found.x)
+
+
+def _torque_noise(boom: Boom, q: Array, acceleration_noise: Array, payload_as: PayloadAs) -> Array:
+    """Root mean square of M(q) times independent noise of the accelerations, over some of the samples, (5,)."""
+    moved = boom.with_payload(0.0) if payload_as == "force" else boom
+    M = mass_matrix(moved, q[:: max(1, len(q) // _MASSES)])
+    noise: Array = np.sqrt(np.mean(np.sum((M * acceleration_noise) ** 2, axis=-1), axis=0))
+    return noise
+
+
+def _extremes(t: Array, values: Array, where: Mask) -> dict[str, float | None]:
+    """Of values (n,): the one of largest size and when, root mean square and mean; None where nothing is looked at."""
+    t, values = t[where], values[where]
+    if not values.size:
+        return dict.fromkeys(("peak", "at_s", "rms", "mean"))
+    at = int(np.abs(values).argmax())
+    rms, mean = np.sqrt(np.mean(values**2)), values.mean()
+    return {"peak": float(values[at]), "at_s": float(t[at]), "rms": float(rms), "mean": float(mean)}
