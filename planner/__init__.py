@@ -1,17 +1,22 @@
 """From targets to motions that have been checked, and to what people keep of them: reports, recordings, CSV."""
 
 from planner.checks import Row, Verdict, average_torque
+from planner.comparison import Comparison, Log, compare, read_log
 from planner.constraints import InfeasiblePathError
+from planner.model_export import mjcf, urdf, write_model
+from planner.motion_files import read_motion, write_motion
 from planner.path import JointLine, Path
-from planner.planning import Move, Profile, check, plan
+from planner.planning import Move, Profile, check, examine, plan, torques
 from planner.report import Report
 from planner.targets import TipTarget, parse_hold, parse_pitch, parse_target
 from planner.time_law import Motion, TimeLaw
 from planner.trajectory import Trajectory, read_csv, sample, write_csv
 
 __all__ = [
+    "Comparison",
     "InfeasiblePathError",
     "JointLine",
+    "Log",
     "Motion",
     "Move",
     "Path",
@@ -24,11 +29,20 @@ __all__ = [
     "Verdict",
     "average_torque",
     "check",
+    "compare",
+    "examine",
+    "mjcf",
     "parse_hold",
     "parse_pitch",
     "parse_target",
     "plan",
     "read_csv",
+    "read_log",
+    "read_motion",
     "sample",
+    "torques",
+    "urdf",
     "write_csv",
+    "write_model",
+    "write_motion",
 ]

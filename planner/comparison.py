@@ -6,9 +6,10 @@ fitted to the samples of a window about each sample, and its derivatives in the 
 the motion is a cubic within any window, and that the noise of a sample has nothing to do with that of the next. Then the
 filter, a weighted sum with weights w, makes noise of standard deviation sigma into one of
 
-    sigma sqrt(sum w^2),    about sigma sqrt(720 / N^5) / h^2 for accelerations from N positions,
+    sigma sqrt(sum w^2),    about sigma sqrt(720 / N^5) / h^2 for accelerations from N positions.
 
-and the torques have M(q) times that. A wider window passes less noise and rounds off more of the motion.
+What that makes of the torques follows from their derivatives by q, qd and qdd, the last of which is M(q). A wider window passes
+less noise, and rounds off more of the motion.
 """
 
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import JOINTS, Boom, InputError, forward_kinematics, mass_matrix
+from boom_model import JOINTS, Boom, InputError, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.boom import IS_LENGTH
 from boom_model.dynamics import PayloadAs
@@ -35,7 +36,8 @@ WINDOW = 0.2
 _ORDER = 3
 _EVEN = 0.01  # steps that differ by less than this share count as even
 _LOOKED_AT = 2_000  # samples of a log that its alignment looks at, and shifts that it tries
-_MASSES = 200  # samples at which the torques' noise is worked out
+_DIFFERENCE = 1e-5
+_WEIGHED = 200  # samples at which the torques' noise is worked out
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +98,8 @@ class Smoothed:
     """The log's."""
     noise: Array
     """(5,) standard deviation of the positions' noise, by what the filter takes off [rad, m]"""
-    acceleration_noise: Array
-    """(5,) standard deviation that is left in qdd [rad/s^2, m/s^2]; 0 where the log has its accelerations"""
+    covariance: Array
+    """(5, 3, 3) of the noise of each joint's q, qd and qdd; 0 for a qd or qdd that the log has"""
     inside: Mask
     """(n,) True where the whole window lies in the log; towards its ends the filter's derivatives are worse"""
 
@@ -139,19 +141,26 @@ def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
     inside = np.zeros(n, dtype=bool)
     inside[N // 2 : n - N // 2] = True
     noise, by_filter = spread(log.q), f"by a cubic Savitzky-Golay filter over {N} samples, {(N - 1) * h:.4g} s"
-    notes, qd, qdd, left = list(log.notes), log.qd, log.qdd, np.zeros(5)
+    notes, qd, qdd = list(log.notes), log.qd, log.qdd
+    weights = np.zeros((3, N))  # of a window's positions in q, qd and qdd
+    weights[0, N // 2] = 1.0
+    rates = savgol_coeffs(N, _ORDER, deriv=1, delta=h, use="dot")
+    from_velocities = np.zeros(5)
     if qd is None:
-        qd = derivative(log.q, 1)
+        qd, weights[1] = derivative(log.q, 1), rates
         notes.append(f"velocities are not in the log: taken from its positions {by_filter}")
-    if qdd is None:
-        source, order, values = ("positions", 2, log.q) if log.qd is None else ("velocities", 1, log.qd)
-        qdd = derivative(values, order)
-        left = spread(values) * np.linalg.norm(savgol_coeffs(N, _ORDER, deriv=order, delta=h))
-        notes.append(f"accelerations are not in the log: taken from its {source} {by_filter}")
+    if qdd is None and log.qd is None:
+        qdd, weights[2] = derivative(log.q, 2), savgol_coeffs(N, _ORDER, deriv=2, delta=h, use="dot")
+        notes.append(f"accelerations are not in the log: taken from its positions {by_filter}")
+    elif qdd is None:
+        qdd, from_velocities = derivative(qd, 1), spread(qd) * np.linalg.norm(rates)
+        notes.append(f"accelerations are not in the log: taken from its velocities {by_filter}")
+    covariance = noise[:, None, None] ** 2 * (weights @ weights.T)
+    covariance[:, 2, 2] += from_velocities**2
     if log.qd is not None and log.qdd is not None:
         inside[:] = True
     trajectory = Trajectory.from_samples(log.t, log.q, qd, qdd, notes=tuple(notes))
-    return Smoothed(trajectory, log.tau, noise, left, inside)
+    return Smoothed(trajectory, log.tau, noise, covariance, inside)
 
 
 def _even(log: Log, window: float) -> Log:
@@ -303,7 +312,7 @@ def compare(
         tip_planned=forward_kinematics(boom, plan.q).position,
         tip_measured=forward_kinematics(boom, measured.q).position,
         noise=ready.noise,
-        torque_noise=_torque_noise(boom, plan.q, ready.acceleration_noise, payload_as),
+        torque_noise=_torque_noise(boom, plan, ready.covariance, payload_as),
         inside=ready.inside[common],
     )
 
@@ -371,11 +380,22 @@ def _best_offset(boom: Boom, planned: Trajectory, curve: "CubicHermiteSpline", m
     return float(found.x)
 
 
-def _torque_noise(boom: Boom, q: Array, acceleration_noise: Array, payload_as: PayloadAs) -> Array:
-    """Root mean square of M(q) times independent noise of the accelerations, over some of the samples, (5,)."""
-    moved = boom.with_payload(0.0) if payload_as == "force" else boom
-    M = mass_matrix(moved, q[:: max(1, len(q) // _MASSES)])
-    noise: Array = np.sqrt(np.mean(np.sum((M * acceleration_noise) ** 2, axis=-1), axis=0))
+def _torque_noise(boom: Boom, plan: Trajectory, covariance: Array, payload_as: PayloadAs) -> Array:
+    """Root mean square over some of the samples of what noise of that covariance makes of the torques, (5,):
+
+    var(tau_i) = sum_j D_ij^T covariance_j D_ij,    D_ij = (dtau_i/dq_j, dtau_i/dqd_j, dtau_i/dqdd_j).
+    """
+    some = slice(None, None, max(1, plan.t.size // _WEIGHED))
+    state = [values[some, None, :] for values in (plan.q, plan.qd, plan.qdd)]
+    steps = _DIFFERENCE * np.eye(5)
+
+    def tau(moved: int, by: Array) -> Array:
+        at = [values + by if i == moved else values for i, values in enumerate(state)]
+        return inverse_dynamics(boom, *at, payload_as=payload_as, reactions=False).tau
+
+    D = np.stack([tau(k, steps) - tau(k, -steps) for k in range(3)], axis=-1) / (2.0 * _DIFFERENCE)  # (n, j, i, 3)
+    D[..., 1] += np.diag(boom.friction.viscous)
+    noise: Array = np.sqrt(np.einsum("njia,jab,njib->ni", D, covariance, D).mean(axis=0))
     return noise
 
 

@@ -453,7 +453,9 @@ COMPARISON_LEGEND = "Solid bodies and the light path: measured. Edges and the or
 def _comparison_bundles(c: Comparison) -> dict[str, list[_Bundle]]:
     tabs: dict[str, list[_Bundle]] = {"Errors": [], "Torques": [], "Positions": []}
     millimetres = c.tip_error[:, None] * 1e3
-    tabs["Errors"].append(_Bundle("plots/error/tip", "distance of the tips [mm]", ["distance [mm]"], [PAYLOAD_COLOR], millimetres))
+    tabs["Errors"].append(
+        _Bundle("plots/error/tip", "distance of the tips [mm]", ["distance [mm]"], [PAYLOAD_COLOR], millimetres)
+    )
     for i, joint in enumerate(JOINTS):
         unit, force = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
         color, pair = JOINT_COLORS[joint], ["planned", "measured"]

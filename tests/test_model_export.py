@@ -34,7 +34,9 @@ def multipliers(text: str) -> dict[str, Array]:
     for joint in ElementTree.fromstring(text).iter("joint"):
         if joint.get("type") != "fixed":
             mimic = joint.find("mimic")
-            followed, times = (joint.get("name"), 1.0) if mimic is None else (mimic.get("joint"), float(mimic.get("multiplier")))
+            followed, times = (
+                (joint.get("name"), 1.0) if mimic is None else (mimic.get("joint"), float(mimic.get("multiplier")))
+            )
             rows[joint.get("name")] = times * np.eye(5)[JOINTS.index(followed)]
     return rows
 
@@ -117,7 +119,9 @@ def in_mujoco(boom: Boom, payload: float | None = None) -> tuple[mujoco.MjModel,
 def set_pose(model: mujoco.MjModel, data: mujoco.MjData, q: Array, qd: Array) -> None:
     """The linkage's two passive joints are the differences of its two directions."""
     for target, values in ((data.qpos, q), (data.qvel, qd)):
-        for name, value in zip((*JOINTS, "outer", "upper"), (*values, values[1] - values[2], values[2] - values[1]), strict=True):
+        for name, value in zip(
+            (*JOINTS, "outer", "upper"), (*values, values[1] - values[2], values[2] - values[1]), strict=True
+        ):
             target[model.joint(name).qposadr[0]] = value
 
 
@@ -147,15 +151,14 @@ def followed() -> tuple[Simulated, Array]:
 def test_mjcf_follows_the_main_move_through_its_closed_loop_on_the_models_torques(followed: tuple[Simulated, Array]):
     """MuJoCo's own integration and its constraint's softness are the difference: 2e-4 of the largest torque."""
     simulated, _ = followed
-    assert simulated.gap < 5e-7
-    assert np.abs(simulated.tracking).max() < 5e-5
-    assert np.abs(simulated.correction).max(axis=0) == pytest.approx(np.zeros(5), abs=0.4)
+    assert simulated.gap < 3e-7
+    assert np.abs(simulated.tracking).max() < 4e-5
+    assert (np.abs(simulated.correction).max(axis=0) < [0.1, 0.1, 0.2, 0.02, 4e-3]).all()
 
 
 def test_mjcf_bears_the_models_pin_force(followed: tuple[Simulated, Array]):
     simulated, expected = followed
-    settled = slice(100, None)
-    assert np.abs(simulated.pin - expected)[settled].max() < 5e-2 * np.abs(expected).max()
+    assert np.abs(simulated.pin - expected).max() < 3e-3 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("name", BOOMS)
@@ -177,7 +180,7 @@ def test_mjcf_has_the_models_mass_matrix_and_tip(name: str):
             M[i, :, column] = G.T @ product
     np.testing.assert_allclose(tip, forward_kinematics(boom, q).position, rtol=0, atol=1e-14)
     expected = mass_matrix(boom, q, drive_inertia=True)
-    assert np.abs(M - expected).max() < 1e-13 * np.abs(expected).max()
+    assert np.abs(M - expected).max() < 1e-14 * np.abs(expected).max()
 
 
 def test_mjcf_stands_still_at_its_keyframes():
@@ -220,6 +223,6 @@ def test_mujoco_is_not_given_a_body_without_mass():
 
 
 def test_another_ending_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match="written as .urdf"):
+    with pytest.raises(InputError, match=r"written as \.urdf"):
         write_model(BOOM, tmp_path / "boom.sdf")
     assert list(tmp_path.iterdir()) == []
