@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import JOINTS, Boom, InputError, forward_kinematics, inverse_dynamics
+from boom_model import JOINTS, Basis, Boom, InputError, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.boom import IS_LENGTH
 from boom_model.dynamics import PayloadAs
@@ -173,7 +173,6 @@ def _even(log: Log, window: float) -> Log:
             f"the log has a gap of {steps[at]:g} s after t = {log.t[at]:g} s, longer than the window of {window:g} s"
         )
     t = np.linspace(log.t[0], log.t[-1], log.t.size)
-
     given = {name: values for name in ("q", "qd", "qdd", "tau") if (values := getattr(log, name)) is not None}
     read = {name: np.stack([np.interp(t, log.t, column) for column in values.T], axis=-1) for name, values in given.items()}
     note = f"the log's steps, {steps.min():.4g} s to {steps.max():.4g} s, are not even: read off every {steps.mean():.4g} s"
@@ -221,6 +220,16 @@ class Comparison:
         error: Array = np.linalg.norm(self.tip_measured - self.tip_planned, axis=-1)
         return error
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of the two motions and of the model."""
+        given = zip(JOINTS, self.boom.friction.origins, strict=True)
+        return (
+            *(f"plan: {note}" for note in self.planned.notes),
+            *(f"log: {note}" for note in self.measured.notes),
+            *(f"{joint} friction is assumed: {o.source}" for joint, o in given if o is not None and o.basis is Basis.ASSUMED),
+        )
+
     def to_json(self, files: dict[str, str]) -> dict[str, Any]:
         """The JSON object of `boom compare`, in SI."""
         t, tip = self.planned.t, self.tip_error
@@ -254,7 +263,7 @@ class Comparison:
                 "mean_m": (self.tip_measured - self.tip_planned).mean(axis=0).tolist(),
             },
             "joints": joints,
-            "notes": list(self.measured.notes),
+            "notes": list(self.notes),
             "files": files,
         }
 

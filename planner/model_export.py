@@ -35,6 +35,7 @@ from boom_model.boom import IS_LENGTH
 from boom_model.drives import drive_torque_limit, reflected_inertia
 from boom_model.frames import R_LINK_BODY
 from planner.files import replacing
+from planner.report import assumptions
 
 UNLIMITED_EFFORT = 1e6
 """URDF must have an effort limit [Nm, the extension's N]; this stands where no drive is given."""
@@ -72,8 +73,9 @@ def write_model(boom: Boom, path: str | Path) -> None:
 def urdf(boom: Boom) -> str:
     """The boom as URDF: a tree, in which the parallelogram is kept by mimic joints.
 
-    Position and velocity limits are the boom's. Effort limits are the drives' at rest, and UNLIMITED_EFFORT where no drive is
-    given. The coupled limit of lower - inner and the drives' reflected inertia have no place in URDF.
+    Position and velocity limits are the boom's. Effort limits are what the drives allow at rest with their margin, and
+    UNLIMITED_EFFORT where no drive is given. The coupled limit of lower - inner and the drives' reflected inertia have no place
+    in URDF.
     """
     top = Element("robot", name=boom.name)
     for text in (
@@ -82,7 +84,7 @@ def urdf(boom: Boom) -> str:
         "A torque that a tool computes for a mimic joint belongs to the joint it mimics: add it there, times the multiplier.",
         f"Coupled limit, which URDF cannot hold: lower - inner at least {boom.limits.linkage:.6g} rad.",
         f"An effort of {UNLIMITED_EFFORT:.0f} says that no drive is given.",
-        _DRAWN,
+        *_remarks(boom),
     ):
         top.append(ElementTree.Comment(f" {text} "))
     for name, color in _COLORS.items():
@@ -97,8 +99,9 @@ def urdf(boom: Boom) -> str:
 def mjcf(boom: Boom) -> str:
     """The boom as MJCF, its loop closed at pin 7 by a `connect` constraint.
 
-    Each joint has a motor, whose control is the joint's torque [Nm, the extension's N], limited to the drive's at rest where
-    one is given, and as armature its drive's reflected inertia. Named poses are keyframes, with the torques that hold them.
+    Each joint has a motor, whose control is the joint's torque [Nm, the extension's N], limited to what its drive allows at
+    rest with its margin, where one is given, and as armature the drive's reflected inertia. Named poses are keyframes, with the
+    torques that hold them.
     The parallelogram has a second, crossed form, which starts where it is flat: the coupled limit keeps away from it at
     lower = inner, nothing does at lower - inner = 180 deg.
 
@@ -107,12 +110,12 @@ def mjcf(boom: Boom) -> str:
     """
     for name, body in boom.bodies.items():
         if not (body.mass > 0.0 and np.linalg.eigvalsh(body.inertia)[0] > 0.0):
-            raise InputError(f"{name} has mass {body.mass:g} kg and a least inertia of 0: MuJoCo needs both to be above 0")
+            raise InputError(f"{name} has no mass, or no inertia about some axis; MuJoCo needs both to be above 0")
     top = Element("mujoco", model=boom.name)
     for text in (
         "The parallelogram is closed at pin 7 by the connect constraint. Start from a keyframe: all joints at 0 is flat.",
         "A motor's control is the torque at the joint. Its armature is the drive's reflected inertia, where that is known.",
-        _DRAWN,
+        *_remarks(boom),
     ):
         top.append(ElementTree.Comment(f" {text} "))
     SubElement(top, "compiler", angle="radian", autolimits="true")
@@ -141,6 +144,11 @@ def mjcf(boom: Boom) -> str:
         hold = inverse_dynamics(boom, q, np.zeros(5), np.zeros(5), reactions=False).tau
         SubElement(keys, "key", name=name, qpos=_text(G @ q), ctrl=_text(hold))
     return _document(top)
+
+
+def _remarks(boom: Boom) -> list[str]:
+    assumed = [f"Assumed: {sentence}".replace("--", "- -") for sentence in assumptions(boom, jerk_limited=False)]
+    return [_DRAWN, *assumed]
 
 
 # The tree
@@ -363,9 +371,10 @@ def _mjcf_body(element: Element, boom: Boom, link: _Link) -> None:
         SubElement(element, "joint", own, name=link.joint, type=kind, axis="0 0 1", range=_text(_range(boom, link.row)))
     body = _body(boom, link.name)
     if body is not None and body.mass > 0.0:
-        # MuJoCo diagonalises a full tensor, which it wants positive
-        tensor = {"fullinertia": _text(body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])}
-        inertia = tensor if body.inertia.any() else {"diaginertia": "0 0 0"}
+        principal = np.diag(body.inertia)
+        inertia = {"diaginertia": _text(principal)}
+        if (body.inertia != np.diag(principal)).any():  # MuJoCo diagonalises a full tensor, which it wants positive
+            inertia = {"fullinertia": _text(body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])}
         SubElement(element, "inertial", inertia, pos=_text(body.com), mass=_text(body.mass))
     drawn = {"rgba": _text((*_COLORS[link.name], 1.0)), "contype": "0", "conaffinity": "0", "group": "2", "mass": "0"}
     for rod in _rods(boom).get(link.name, []):

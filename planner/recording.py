@@ -108,7 +108,7 @@ def write_comparison_recording(path: str | Path, comparison: Comparison) -> None
 
     def log(recording: rr.RecordingStream) -> None:
         recording.send_blueprint(_blueprint(_eye(boom, comparison.planned.q), {}, tabs))
-        notes = "\n".join(f"- {note}" for note in (COMPARISON_LEGEND, *comparison.measured.notes))
+        notes = "\n".join(f"- {note}" for note in (COMPARISON_LEGEND, *comparison.notes))
         recording.log("report", rr.TextDocument(notes, media_type="text/markdown"), static=True)
         _log_solids(recording, boom)
         _log_solids(recording, boom, ghost=True)

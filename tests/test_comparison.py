@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,17 @@ import pytest
 from pyarrow import csv
 from rerun.chunk import RrdReader
 
-from boom_model import JOINTS, Boom, InputError, body_transforms, forward_kinematics, inverse_dynamics, jacobian
+from boom_model import (
+    JOINTS,
+    Basis,
+    Boom,
+    InputError,
+    Origin,
+    body_transforms,
+    forward_kinematics,
+    inverse_dynamics,
+    jacobian,
+)
 from boom_model.arrays import Array
 from planner import Trajectory, cli, plan, write_csv
 from planner.comparison import Log, Smoothed, compare, read_log, smoothed
@@ -166,6 +177,16 @@ def test_uneven_steps_are_evened_out_and_said_so():
     assert np.abs(ready.trajectory.qdd - expected)[inner].max() < 1e-3
     assert np.abs(qdd).max() > 0.3
     assert smoothed(Log.of(np.arange(100) * 0.01, q[:100])).trajectory.notes[0].startswith("velocities")
+
+
+def test_notes_say_whose_they_are_and_what_is_assumed():
+    friction = replace(BOOM.friction, origins=(None, Origin(Basis.ASSUMED, "this test"), None, None, None))
+    plan_from_file = replace(MOVE, notes=("from a file",))
+    found = compare(replace(BOOM, friction=friction), plan_from_file, Log.of(MOVE.t, MOVE.q, MOVE.qd))
+    plan_note, log_note, assumed = found.notes
+    assert plan_note == "plan: from a file"
+    assert log_note.startswith("log: accelerations are not in the log: taken from its velocities")
+    assert assumed == "inner friction is assumed: this test"
 
 
 @pytest.mark.parametrize(

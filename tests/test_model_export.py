@@ -97,6 +97,8 @@ def test_urdf_says_what_it_cannot_hold():
     text = urdf(BOOM)
     for sentence in ("cannot close a loop", "belongs to the joint it mimics", "at least 0.0872665 rad", "not measured"):
         assert sentence in text
+    for form in (text, mjcf(BOOM)):
+        assert "Assumed: yaw velocity limit 30 deg/s" in form
 
 
 class Simulated(NamedTuple):
@@ -218,7 +220,7 @@ def test_without_payload_both_are_lighter(tmp_path: Path):
 
 def test_mujoco_is_not_given_a_body_without_mass():
     bodies = {**BOOM.bodies, "outer": Body(0.0, np.zeros(3), np.zeros((3, 3)))}
-    with pytest.raises(InputError, match="outer has mass 0 kg"):
+    with pytest.raises(InputError, match="outer has no mass"):
         mjcf(replace(BOOM, bodies=bodies))
 
 
