@@ -35,7 +35,8 @@ WINDOW = 0.2
 
 _ORDER = 3
 _EVEN = 0.01  # steps that differ by less than this share count as even
-_LOOKED_AT = 2_000  # samples of a log that its alignment looks at, and shifts that it tries
+_SHIFTS = 50_000  # that the alignment tries at most, before it goes on between two of them
+_LOOKED_AT = 20_000  # samples of a log that it looks at there
 _DIFFERENCE = 1e-5
 _WEIGHED = 200  # samples at which the torques' noise is worked out
 
@@ -371,21 +372,37 @@ def _curve(planned: Trajectory) -> "CubicHermiteSpline":
 
 
 def _best_offset(boom: Boom, planned: Trajectory, curve: "CubicHermiteSpline", measured: Trajectory) -> float:
-    """The least of the sum of squared errors, each joint as a share of its range; the plan rests before and after itself."""
+    """The least of the sum of squared errors, each joint as a share of its range; the plan rests before and after itself.
+
+    At every shift k of a grid, sum_i (q_i - p_i+k)^2 = sum q_i^2 - 2 sum q_i p_i+k + sum p_i+k^2; then about the least of them.
+    """
     from scipy.optimize import minimize_scalar
+    from scipy.signal import correlate
 
-    some = slice(None, None, max(1, measured.t.size // _LOOKED_AT))
-    t, q = measured.t[some], measured.q[some]
     weight = 1.0 / np.maximum(boom.limits.upper - boom.limits.lower, 1e-9)
+    start, end = planned.t[[0, -1]]
 
-    def cost(offset: float) -> float:
-        error = (q - curve(np.clip(t + offset, planned.t[0], planned.t[-1]))) * weight
-        return float(np.sum(error**2))
+    def plan_at(t: Array) -> Array:
+        away: Array = (curve(np.clip(t, start, end)) - planned.q[0]) * weight
+        return away
 
-    shifts = np.linspace(planned.t[0] - t[-1], planned.t[-1] - t[0], _LOOKED_AT)
-    coarse = shifts[np.argmin([cost(shift) for shift in shifts])]
-    step = float(shifts[1] - shifts[0])
-    found = minimize_scalar(cost, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": 1e-9})
+    first, last = measured.t[[0, -1]]
+    step = (end - start + 2.0 * (last - first)) / _SHIFTS
+    log_grid = np.arange(first, last, step)
+    plan_grid = np.arange(start - (last - first), end + (last - first), step)
+    p, cost = plan_at(plan_grid), np.zeros(plan_grid.size - log_grid.size + 1)
+    for i in range(5):
+        q = (np.interp(log_grid, measured.t, measured.q[:, i]) - planned.q[0, i]) * weight[i]
+        squares = np.concatenate([[0.0], np.cumsum(p[:, i] ** 2)])
+        cost += squares[log_grid.size :] - squares[: -log_grid.size] - 2.0 * correlate(p[:, i], q, mode="valid", method="fft")
+    coarse = float(plan_grid[cost.argmin()] - first)
+    some = slice(None, None, max(1, measured.t.size // _LOOKED_AT))
+    t, q = measured.t[some], (measured.q[some] - planned.q[0]) * weight
+
+    def error(offset: float) -> float:
+        return float(np.sum((q - plan_at(t + offset)) ** 2))
+
+    found = minimize_scalar(error, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": 1e-9})
     return float(found.x)
 
 

@@ -69,20 +69,23 @@ def read_motion(path: str | Path) -> Trajectory:
     Raises:
         InputError: as `read_csv`; or a Parquet column has another unit than this toolkit's.
     """
-    data, notes = read_quantities(path)
+    data, notes = read_quantities(path, with_torques=False)
     return trajectory_of(path, data, notes)
 
 
-def read_quantities(path: str | Path) -> tuple[dict[str, Array], tuple[str, ...]]:
+def read_quantities(path: str | Path, *, with_torques: bool = True) -> tuple[dict[str, Array], tuple[str, ...]]:
     """What stands in a motion's file: t (n,) and q, and qd, qdd and tau where they are there, (n, 5) each; and its notes.
+
+    Args:
+        with_torques: whether to look at tau at all.
 
     Raises:
         InputError: as `read_motion`.
     """
     if Path(path).suffix.lower() != ".parquet":
-        return quantities(path, csv_table(path)), ()
+        return quantities(path, csv_table(path), with_torques=with_torques), ()
     table, notes = _parquet_table(path)
-    return quantities(path, table, first="row 1"), notes
+    return quantities(path, table, first="row 1", with_torques=with_torques), notes
 
 
 # Parquet

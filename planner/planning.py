@@ -216,7 +216,7 @@ def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass") 
     Raises:
         InputError: as `inverse_dynamics`, or a torque is not finite.
     """
-    return _loads(boom, trajectory, None, payload_as)[0].tau
+    return _finite_loads(boom, trajectory, None, payload_as, reactions=False).tau
 
 
 def _loads(
@@ -225,18 +225,32 @@ def _loads(
     """Loads with friction, their breakdown, and the base's motion.
 
     Raises:
-        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+        InputError: as `_finite_loads`.
     """
     base = None if vehicle is None else base_motion(vehicle, trajectory.t)
     states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    loads = _finite_loads(boom, trajectory, base, payload_as)
     with np.errstate(over="ignore", invalid="ignore"):
-        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True)
-        finite = np.isfinite(loads.tau).all(axis=-1)
-        if not finite.all():
-            at = int(np.argmin(finite))
-            raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
         parts = breakdown(boom, *states, base=base, payload_as=payload_as, friction=True)
     return loads, parts, base
+
+
+def _finite_loads(
+    boom: Boom, trajectory: Trajectory, base: BaseMotion | None, payload_as: PayloadAs, reactions: bool = True
+) -> Loads:
+    """Loads with friction.
+
+    Raises:
+        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+    """
+    states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    with np.errstate(over="ignore", invalid="ignore"):
+        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True, reactions=reactions)
+    finite = np.isfinite(loads.tau).all(axis=-1)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
+    return loads
 
 
 def _shock(boom: Boom, trajectory: Trajectory, vehicle: VehicleCase, payload_as: PayloadAs) -> Shock:

@@ -108,7 +108,7 @@ def write_comparison_recording(path: str | Path, comparison: Comparison) -> None
 
     def log(recording: rr.RecordingStream) -> None:
         recording.send_blueprint(_blueprint(_eye(boom, comparison.planned.q), {}, tabs))
-        notes = "\n".join(f"- {note}" for note in (COMPARISON_LEGEND, *comparison.notes))
+        notes = "\n".join(f"- {note}" for note in (_COMPARISON_LEGEND, *comparison.notes))
         recording.log("report", rr.TextDocument(notes, media_type="text/markdown"), static=True)
         _log_solids(recording, boom)
         _log_solids(recording, boom, ghost=True)
@@ -222,10 +222,9 @@ def _log_motion(
         )
         recording.send_columns(entity, [_time(times)], motion)
 
-    if vehicle is None:
-        log("world/mount", np.eye(4)[None], "tf#/world", "mount", t[:1])
-    else:
-        log("world/mount", base_pose(vehicle, t), "tf#/world", "mount", t)
+    if not ghost:
+        mount = np.eye(4)[None] if vehicle is None else base_pose(vehicle, t)
+        log("world/mount", mount, "tf#/world", "mount", t[: len(mount)])
     for start in range(0, len(t), _POSES_AT_ONCE):
         part = slice(start, start + _POSES_AT_ONCE)
         for name, T in body_transforms(boom, q[part]).items():
@@ -447,7 +446,7 @@ def _bundles(move: Move) -> dict[str, list[_Bundle]]:
     return tabs
 
 
-COMPARISON_LEGEND = "Solid bodies and the light path: measured. Edges and the orange path: planned."
+_COMPARISON_LEGEND = "Solid bodies and the light path: measured. Edges and the orange path: planned."
 
 
 def _comparison_bundles(c: Comparison) -> dict[str, list[_Bundle]]:

@@ -174,8 +174,8 @@ def csv_table(path: str | Path) -> "pa.Table":
         raise InputError(f"{path}: not a motion's CSV: {error}") from None
 
 
-def quantities(path: str | Path, table: "pa.Table", first: str = "line 2") -> dict[str, Array]:
-    """t (n,) and q, and qd, qdd and tau where they are there, (n, 5) each, of a motion's table.
+def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, with_torques: bool = False) -> dict[str, Array]:
+    """t (n,) and q, and qd, qdd and where asked for tau, as far as they are there, (n, 5) each, of a motion's table.
 
     Args:
         first: what a message calls the first sample.
@@ -185,7 +185,8 @@ def quantities(path: str | Path, table: "pa.Table", first: str = "line 2") -> di
     """
     names = set(table.column_names)
     _complain(path, "has twice the column", {name for name in names if table.column_names.count(name) > 1})
-    found = [name for name in (*_QUANTITIES, "tau") if name == "q" or any(f"{name}{i}" in names for i in range(1, 6))]
+    looked_for = (*_QUANTITIES, "tau") if with_torques else _QUANTITIES
+    found = [name for name in looked_for if name == "q" or any(f"{name}{i}" in names for i in range(1, 6))]
     needed = {"t", *(f"{name}{i}" for name in found for i in range(1, 6))}
     _complain(path, "lacks the column", needed - names)
     _complain(path, "has an unknown column", names - {*COLUMNS, *TORQUES})
@@ -211,12 +212,12 @@ def trajectory_of(path: str | Path, data: dict[str, Array], notes: tuple[str, ..
     try:
         if given:
             return Trajectory.from_samples(data["t"], data["q"], data["qd"], data["qdd"], notes=notes)
-        return _fitted(data["t"], data["q"])
+        return _fitted(data["t"], data["q"], notes)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _fitted(t: Array, q: Array) -> Trajectory:
+def _fitted(t: Array, q: Array, notes: tuple[str, ...]) -> Trajectory:
     from scipy.interpolate import CubicSpline
 
     still = np.zeros_like(q)
@@ -224,7 +225,7 @@ def _fitted(t: Array, q: Array) -> Trajectory:
     if t.size < 4:
         raise InputError(f"{t.size} samples without velocities and accelerations; a spline needs at least 4")
     spline = CubicSpline(plain.t, plain.q)
-    return Trajectory.from_samples(t, q, spline(t, 1), spline(t, 2), notes=(_FITTED,))
+    return Trajectory.from_samples(t, q, spline(t, 1), spline(t, 2), notes=(*notes, _FITTED))
 
 
 def _complain(path: str | Path, what: str, names: set[str]) -> None:

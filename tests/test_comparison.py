@@ -157,6 +157,17 @@ def test_the_best_offset_finds_the_clocks_difference(lag: float):
     assert abs(compare(BOOM, MOVE, log, offset=lag).best_offset - found.offset) < 1e-9
 
 
+def test_the_best_offset_finds_a_piece_of_a_long_motion_of_many_cycles():
+    """A minute of swings, one a second, each a little wider: a search from one place would end in a neighbour's."""
+    t = np.arange(6000) * 0.01
+    swing = 0.005 * t[:, None] * np.array([1.0, 0.5, 0.5, 0.3, 1.0])
+    q = np.array([1.0, 0.8, 2.0, 0.5, 0.0]) + swing * np.sin(2 * np.pi * t)[:, None]
+    planned = Trajectory.from_samples(t, q, np.gradient(q, t, axis=0), np.zeros_like(q))
+    piece = slice(3140, 3640)
+    log = Log.of(t[piece] - 31.4, noisy(t[piece], q[piece]))
+    assert compare(BOOM, planned, log, offset=None).offset == pytest.approx(31.4, abs=1e-3)
+
+
 def test_a_delay_is_an_error_unless_it_is_fitted_away():
     delayed = Log.of(MOVE.t, compare(BOOM, MOVE, Log.of(MOVE.t, MOVE.q, MOVE.qd, MOVE.qdd)).planned.q, MOVE.qd, MOVE.qdd)
     late = Log.of(delayed.t + 0.02, delayed.q, delayed.qd, delayed.qdd)

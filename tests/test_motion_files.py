@@ -154,3 +154,11 @@ def test_another_ending_is_refused(tmp_path: Path):
 def test_a_file_of_any_other_name_is_read_as_csv(tmp_path: Path):
     write_csv(MOVE.trajectory, tmp_path / "move.log")
     np.testing.assert_array_equal(read_motion(tmp_path / "move.log").q, read_csv(tmp_path / "move.log").q)
+
+
+def test_torques_matter_to_those_who_ask_for_them(tmp_path: Path):
+    table = table_of(tmp_path).append_column("tau1", pa.array(np.full(MOVE.trajectory.t.size, np.nan)))
+    parquet.write_table(table, tmp_path / "nan.parquet")
+    np.testing.assert_array_equal(read_motion(tmp_path / "nan.parquet").q, MOVE.trajectory.q)
+    with pytest.raises(InputError, match="lacks the column tau2, tau3, tau4, tau5"):
+        read_quantities(tmp_path / "nan.parquet")
