@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.drives import Drive
 from boom_model.errors import InputError
+from boom_model.keep_out import KeepOut
 from boom_model.provenance import Origin, Sourced
 
 JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
@@ -148,6 +149,8 @@ class Boom:
     mount: Mount
     gravity: float = 9.81
     """[m/s^2]"""
+    keep_out: KeepOut | None = None
+    """What the arm must keep away from; None where nobody says."""
 
     @staticmethod
     def load(path: str | Path | None = None, catalogue: str | Path | None = None) -> "Boom":

@@ -1,18 +1,22 @@
 """From targets to motions that have been checked, and to what people keep of them: reports, recordings, CSV."""
 
+from planner.certificate import Certificate, WorstRatio, certify
 from planner.checks import Row, Verdict, average_torque
 from planner.comparison import Comparison, Log, compare, read_log
 from planner.constraints import InfeasiblePathError
 from planner.model_export import mjcf, urdf, write_model
 from planner.motion_files import read_motion, write_motion
 from planner.path import JointLine, Path
-from planner.planning import Move, Profile, check, examine, plan, torques
+from planner.planning import Move, check, examine, plan, torques
 from planner.report import Report
+from planner.stopping import Stop, WorstStop, stop
 from planner.targets import TipTarget, parse_hold, parse_pitch, parse_target
 from planner.time_law import Motion, TimeLaw
+from planner.timing import Profile
 from planner.trajectory import Trajectory, read_csv, sample, write_csv
 
 __all__ = [
+    "Certificate",
     "Comparison",
     "InfeasiblePathError",
     "JointLine",
@@ -23,11 +27,15 @@ __all__ = [
     "Profile",
     "Report",
     "Row",
+    "Stop",
     "TimeLaw",
     "TipTarget",
     "Trajectory",
     "Verdict",
+    "WorstRatio",
+    "WorstStop",
     "average_torque",
+    "certify",
     "check",
     "compare",
     "examine",
@@ -40,6 +48,7 @@ __all__ = [
     "read_log",
     "read_motion",
     "sample",
+    "stop",
     "torques",
     "urdf",
     "write_csv",

@@ -15,6 +15,7 @@ from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, LIMIT_TOLERANCE
 from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque, speed_for_torque
 from boom_model.dynamics import PayloadAs
+from planner.clearance import nearest_approach
 from planner.trajectory import Trajectory
 
 SAMPLING_SLACK = 1e-3
@@ -104,6 +105,7 @@ def check_rows(
         )
         rows += _undriven_rows(view) if drive is None else _driven_rows(view, drive, shock)
     rows += _mount_rows(boom, trajectory.t, loads)
+    rows += _clearance_rows(boom, trajectory)
     return tuple(rows)
 
 
@@ -225,6 +227,18 @@ def _room(joint: str, check: str, demand: float, limit: float, room: float, unit
     verdict = Verdict.PASS if room >= -LIMIT_TOLERANCE else Verdict.FAIL
     room = 0.0 if abs(room) <= LIMIT_TOLERANCE else float(room)
     return Row(joint, check, float(demand), float(limit), unit, room, 0.0, float(at), verdict, origin.basis, origin.source)
+
+
+def _clearance_rows(boom: Boom, trajectory: Trajectory) -> Iterator[Row]:
+    """The arm's nearest approach to what it must keep away from, as the mount carries it."""
+    keep = boom.keep_out
+    if keep is None:
+        return
+    at, found = nearest_approach(boom, trajectory.q)
+    origins = [keep.origin, *(shape.origin for shape in keep.shapes if shape.name == found.shape)]
+    origin = Origin(Basis.weakest([each.basis for each in origins]), "; ".join(each.source for each in origins))
+    check, room = f"clearance of {found.link} to {found.shape}", found.distance - keep.clearance
+    yield _room("arm", check, found.distance, keep.clearance, room, "m", float(trajectory.t[at]), origin)
 
 
 def _rate_rows(boom: Boom, trajectory: Trajectory, i: int) -> Iterator[Row]:

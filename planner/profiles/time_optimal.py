@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
@@ -16,7 +17,16 @@ from toppra.interpolator import AbstractGeometricPath
 from boom_model import BaseMotion, Boom
 from boom_model.arrays import Array
 from boom_model.drives import drive_torque_tangent
-from planner.constraints import PathDynamics, explain_infeasible, gear_limits, motor_limits, path_dynamics
+from planner.constraints import (
+    PathDynamics,
+    explain_infeasible,
+    gear_limits,
+    jerk_stretch,
+    least_stretch,
+    motor_limits,
+    path_dynamics,
+    rotors,
+)
 from planner.path import Path
 from planner.profiles.cubic import cubic
 from planner.time_law import TimeLaw
@@ -24,6 +34,9 @@ from planner.time_law import TimeLaw
 GRID_INTERVALS = 500
 _SOLVES = 20
 _CONVERGED = 1e-5  # relative gain of a solve, below which the next is not worth its time
+_NARROWEST = -2.5  # of the windows to average over: the power of ten, as a share of the duration
+_WINDOWS = 11
+_WINDOW_TOLERANCE = 1e-3
 
 
 def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, intervals: int = GRID_INTERVALS) -> TimeLaw:
@@ -45,10 +58,12 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
     if (demands.static_ratio > 1.0).any():  # a swing might carry the load past such a place, but could not stop at it
         raise explain_infeasible(demands)
     unit = cubic(boom, path, base).duration  # solved in units of the cubic's duration, where s' and s'' are of order one
-    best, duration, x = None, np.inf, np.zeros_like(s)
+    best, duration, x, solves, gain = None, np.inf, np.zeros_like(s), 0, 0.0
     for _ in range(_SOLVES):
         speed = _solve(_Condition(_rows(demands, x), demands.x_max, unit), path, s)
         took = np.inf if speed is None else float(np.sum(2.0 * np.diff(s) / (speed[:-1] + speed[1:])))
+        solves += 1
+        gain = 1.0 if np.isinf(duration) else max(0.0, 1.0 - took / duration)
         if speed is None or took >= duration * (1.0 - _CONVERGED):
             break
         best, duration, x = speed, took, (speed / unit) ** 2
@@ -57,13 +72,36 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
     step = np.diff(s)
     durations = 2.0 * step / (best[:-1] + best[1:])
     acceleration = (best[1:] ** 2 - best[:-1] ** 2) / (2.0 * step)
-    return TimeLaw.from_pieces(durations, [acceleration / 2.0, best[:-1], s[:-1]]).stretched(unit)
+    law = TimeLaw.from_pieces(durations, [acceleration / 2.0, best[:-1], s[:-1]]).stretched(unit)
+    return replace(law, iterations=solves, residual=gain)
+
+
+def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None) -> TimeLaw:
+    """A law averaged over a window and slowed until it keeps the joints' jerk limits besides their others.
+
+    Averaging s(t) neither leaves the path nor starts or ends in motion, makes the acceleration continuous and 0 at both ends,
+    and bounds the jerk by the jump of the acceleration over the window. What it shifts past a limit an even slowing mends; the
+    window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
+    makes the least-time jerk-limited one; elsewhere it is not the optimum.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def smooth(exponent: float) -> TimeLaw:
+        smoothed = law.averaged(law.duration * 10.0**exponent)
+        return smoothed.stretched(max(1.0, jerk_stretch(boom, path, smoothed), least_stretch(boom, path, smoothed, base)))
+
+    exponents = np.linspace(_NARROWEST, 0.0, _WINDOWS)
+    least = int(np.argmin([smooth(exponent).duration for exponent in exponents]))
+    around = exponents[max(least - 1, 0)], exponents[min(least + 1, _WINDOWS - 1)]
+    found = minimize_scalar(lambda x: smooth(x).duration, bounds=around, method="bounded", options={"xatol": _WINDOW_TOLERANCE})
+    return min(smooth(float(found.x)), smooth(float(exponents[least])), key=lambda each: each.duration)
 
 
 def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
     """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,)."""
     boom, zero = demands.boom, np.zeros_like(demands.s)
-    at_rest, gears, rotors = motor_limits(boom, np.zeros(5)), gear_limits(boom), demands.rotors
+    at_rest, gears, inertias = motor_limits(boom, np.zeros(5)), gear_limits(boom), rotors(boom)
+    intercepts, slopes = demands.friction_tangent(x)
     columns = []
     for i, drive in enumerate(boom.drives):
         p1, p2, limit = demands.p1[:, i], demands.p2[:, i], boom.limits.acceleration[i]
@@ -72,13 +110,15 @@ def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
         if drive is None:
             continue
         tangent = drive_torque_tangent(drive, p1 * np.sqrt(x))
-        torques = [demands.c[:, i]] + ([demands.c[:, i] + demands.friction[:, i]] if demands.friction[:, i].any() else [])
-        for sign, held in product((1.0, -1.0), torques):
-            a, b, c = sign * demands.a[:, i], sign * demands.b[:, i], sign * held
+        torques = [(demands.b[:, i], demands.c[:, i])]
+        if intercepts[:, i].any():  # without friction as well: it earns no credit while braking
+            torques.append((demands.b[:, i] + slopes[:, i], demands.c[:, i] + intercepts[:, i]))
+        for sign, (carried, held) in product((1.0, -1.0), torques):
+            a, b, c = sign * demands.a[:, i], sign * carried, sign * held
             if np.isfinite(gears[i]):
                 columns.append((a / gears[i], b / gears[i], c / gears[i]))
             if np.isfinite(at_rest[i]):
-                a, b = a + sign * rotors[i] * p1, b + sign * rotors[i] * p2
+                a, b = a + sign * inertias[i] * p1, b + sign * inertias[i] * p2
                 columns.append((a / at_rest[i], b / at_rest[i], c / at_rest[i]))
                 if tangent is not None:
                     intercept, slope = tangent[0], tangent[1] * p1**2
