@@ -84,10 +84,8 @@ class Report:
         """What certificate and stop say, for people."""
         said = []
         if self.certificate is not None:
-            of = self.certificate
-            said.append(
-                f"Certificate: recomputed at {of.samples} points; {of.iterations} solve(s), the last gained {of.residual:.1e}"
-            )
+            of, more = self.certificate, f"one more could add {self.certificate.residual:.0e} of a limit"
+            said.append(f"Certificate: recomputed at {of.samples} points; {of.iterations} solve(s), {more}")
         if self.stop is not None:
             said.append(
                 f"Stopping: at worst {self.stop.time_s:.2f} s ({self.stop.time_way}, begun at {self.stop.time_at_s:.2f} s) and "
