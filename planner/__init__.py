@@ -2,9 +2,12 @@
 
 from planner.certificate import Certificate, WorstRatio, certify
 from planner.checks import Row, Verdict, average_torque
+from planner.comparison import Comparison, Log, compare, read_log
 from planner.constraints import InfeasiblePathError
+from planner.model_export import mjcf, urdf, write_model
+from planner.motion_files import read_motion, write_motion
 from planner.path import JointLine, Path
-from planner.planning import Move, check, plan
+from planner.planning import Move, check, examine, plan, torques
 from planner.report import Report
 from planner.stopping import Stop, WorstStop, stop
 from planner.targets import TipTarget, parse_hold, parse_pitch, parse_target
@@ -14,8 +17,10 @@ from planner.trajectory import Trajectory, read_csv, sample, write_csv
 
 __all__ = [
     "Certificate",
+    "Comparison",
     "InfeasiblePathError",
     "JointLine",
+    "Log",
     "Motion",
     "Move",
     "Path",
@@ -32,12 +37,21 @@ __all__ = [
     "average_torque",
     "certify",
     "check",
+    "compare",
+    "examine",
+    "mjcf",
     "parse_hold",
     "parse_pitch",
     "parse_target",
     "plan",
     "read_csv",
+    "read_log",
+    "read_motion",
     "sample",
     "stop",
+    "torques",
+    "urdf",
     "write_csv",
+    "write_model",
+    "write_motion",
 ]

@@ -40,17 +40,18 @@ SHOCK_SAMPLES = 20
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A planned move, its loads, and what the checks say of it."""
+    """A move, its loads, and what the checks say of it."""
 
     boom: Boom
-    profile: Profile
+    profile: str
+    """A `Profile`, or what a motion from elsewhere is called."""
     trajectory: Trajectory
     loads: Loads
     parts: Breakdown
     """The torques' breakdown, friction included."""
     report: Report
     motions: tuple[Motion, ...]
-    """The continuous motions behind the samples, from stop to stop; none of an empty move."""
+    """The continuous motions behind a plan's samples, from stop to stop; none of an empty move or a motion from elsewhere."""
     vehicle: VehicleCase | None = None
 
 
@@ -139,9 +140,21 @@ def check(
         vehicle: what the vehicle does meanwhile; None rests on level ground.
         profile: what the report calls the motion.
     """
+    return examine(boom, trajectory, payload_as=payload_as, vehicle=vehicle, profile=profile).report
+
+
+def examine(
+    boom: Boom,
+    trajectory: Trajectory,
+    *,
+    payload_as: PayloadAs = "mass",
+    vehicle: VehicleCase | None = None,
+    profile: str = "recorded",
+) -> Move:
+    """Any motion with its loads and its checks, as `write_recording` takes it; for the arguments see `check`."""
     loads, parts, base = _loads(boom, trajectory, vehicle, payload_as)
     shock = None if vehicle is None or vehicle.peak == 0.0 else _shock(boom, trajectory, vehicle, payload_as)
-    return Report(
+    report = Report(
         profile=str(profile),
         duration=trajectory.duration,
         rows=check_rows(
@@ -157,6 +170,7 @@ def check(
         assumptions=assumptions(boom, trajectory.qddd is not None),
         peaks=torque_peaks(trajectory.t, parts),
     )
+    return Move(boom, str(profile), trajectory, loads, parts, report, (), vehicle)
 
 
 def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None) -> Array:
@@ -165,7 +179,8 @@ def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", 
     Raises:
         InputError: as `inverse_dynamics`, or a torque is not finite.
     """
-    return _loads(boom, trajectory, vehicle, payload_as)[0].tau
+    base = None if vehicle is None else base_motion(vehicle, trajectory.t)
+    return _finite_loads(boom, trajectory, base, payload_as, reactions=False).tau
 
 
 def _loads(
@@ -174,18 +189,32 @@ def _loads(
     """Loads with friction, their breakdown, and the base's motion.
 
     Raises:
-        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+        InputError: as `_finite_loads`.
     """
     base = None if vehicle is None else base_motion(vehicle, trajectory.t)
     states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    loads = _finite_loads(boom, trajectory, base, payload_as)
     with np.errstate(over="ignore", invalid="ignore"):
-        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True)
-        finite = np.isfinite(loads.tau).all(axis=-1)
-        if not finite.all():
-            at = int(np.argmin(finite))
-            raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
         parts = breakdown(boom, *states, base=base, payload_as=payload_as, friction=True)
     return loads, parts, base
+
+
+def _finite_loads(
+    boom: Boom, trajectory: Trajectory, base: BaseMotion | None, payload_as: PayloadAs, reactions: bool = True
+) -> Loads:
+    """Loads with friction.
+
+    Raises:
+        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+    """
+    states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    with np.errstate(over="ignore", invalid="ignore"):
+        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True, reactions=reactions)
+    finite = np.isfinite(loads.tau).all(axis=-1)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
+    return loads
 
 
 def _shock(boom: Boom, trajectory: Trajectory, vehicle: VehicleCase, payload_as: PayloadAs) -> Shock:
