@@ -52,7 +52,7 @@ def certify(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = Non
 
     Friction is counted. Only the base's tilt is: what else a vehicle does was not planned for.
     """
-    parts = [motion.law.times(max(_EACH, SAMPLES // (len(motion.law.s.x) - 1))) for motion in motions]
+    parts = [motion.law.times(max(_EACH, -(-SAMPLES // (len(motion.law.s.x) - 1)))) for motion in motions]
     starts = np.cumsum([0.0, *(motion.duration for motion in motions)])
     t = np.concatenate([start + part for start, part in zip(starts[:-1], parts, strict=True)])
     states = zip(*(motion(part) for motion, part in zip(motions, parts, strict=True)), strict=True)

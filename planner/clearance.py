@@ -101,6 +101,19 @@ def require_clear(boom: Boom, q: Array, name: str) -> None:
         raise InfeasibleError(f"{name}: {sentence(boom, found)}")
 
 
+def require_path_clear(boom: Boom, path: Path) -> None:
+    """Whether a path keeps away from every shape, where any is given.
+
+    Raises:
+        InfeasibleError: it does not; names the place, the link, the shape and the distance.
+    """
+    if boom.keep_out is None:
+        return
+    found = least_clearance(boom, path)
+    if found.distance < boom.keep_out.clearance:
+        raise InfeasibleError(f"at {found.s:.1%} of the path {sentence(boom, found)}; a path of this kind is not led round")
+
+
 def sentence(boom: Boom, found: Clearance) -> str:
     """What a nearest approach says against the clearance that is asked for."""
     assert boom.keep_out is not None

@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import Boom, InfeasibleError, InputError
+from boom_model import Boom, InputError
 from boom_model.arrays import Array, checked
 from boom_model.boom import JOINTS
 from boom_model.holds import Hold
-from planner.clearance import least_clearance, require_clear, sentence
+from planner.clearance import require_clear, require_path_clear
 from planner.path import JointLine, Path, SplinePath, TipArc, TipLine, TipPath, follow, through
 from planner.routing import detour
 from planner.targets import Target, TipTarget, resolve
@@ -42,7 +42,8 @@ def legs(
             raise InputError("a move through targets without a stop is led by the joints, not by a line or an arc of the tip")
         paths, notes = _tip_paths(boom, targets, pitch, hold, along), ()
     for path in paths:
-        _require_clear(boom, path)
+        if not isinstance(path, JointLine):  # a straight move is on a way that has been found clear
+            require_path_clear(boom, path)
     return paths, (*notes, *(path.sentence for path in paths if isinstance(path, TipPath | SplinePath)))
 
 
@@ -88,14 +89,6 @@ def _place(target: Target) -> Array:
     if not isinstance(target, TipTarget):
         raise InputError(f"{target!r} is no tip target; a line or an arc of the tip goes between tip targets")
     return checked("tip target", target.position)
-
-
-def _require_clear(boom: Boom, path: Path) -> None:
-    if boom.keep_out is None or isinstance(path, JointLine):  # a straight move is on a way that has been found clear
-        return
-    found = least_clearance(boom, path)
-    if found.distance < boom.keep_out.clearance:
-        raise InfeasibleError(f"at {found.s:.1%} of the path {sentence(boom, found)}; a path of this kind is not led round")
 
 
 def _shown(q: Array) -> str:

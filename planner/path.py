@@ -159,7 +159,8 @@ def through(boom: Boom, waypoints: Array) -> SplinePath:
 
     A natural cubic spline whose parameter between two waypoints is in proportion to the time that the joints' top speeds need
     there. Where it would overshoot a position limit, a quintic one with monotone (PCHIP) slopes and no curvature at the
-    waypoints, which turns back at a joint's extremes and not beyond them.
+    waypoints, which turns back at a joint's extremes and not beyond them: without curvature at either end, a quintic is
+    monotone where both its end slopes are within 5/4 of its mean slope.
 
     Raises:
         InfeasibleError: both leave the position limits; names the joint, the place and the excess.
@@ -170,7 +171,9 @@ def through(boom: Boom, waypoints: Array) -> SplinePath:
     smooth = SplinePath(CubicSpline(knots, waypoints, bc_type="natural"), waypoints)
     if overshoot(boom, smooth) is None:
         return smooth
-    slopes = PchipInterpolator(knots, waypoints)(knots, 1)
+    means = np.abs(np.diff(waypoints, axis=0)) / np.diff(knots)[:, None]
+    most = 1.25 * np.minimum(means[[0, *range(len(means))]], means[[*range(len(means)), -1]])
+    slopes = np.clip(PchipInterpolator(knots, waypoints)(knots, 1), -most, most)
     given = np.stack([waypoints, slopes, np.zeros_like(slopes)], axis=1)
     tight = SplinePath(PPoly.from_bernstein_basis(BPoly.from_derivatives(knots, given)), waypoints)
     beyond = overshoot(boom, tight)

@@ -9,6 +9,7 @@ import numpy as np
 from boom_model import JOINTS, BaseMotion, Boom, InfeasibleError, InputError
 from boom_model.arrays import Array, scalar
 from planner.certificate import WorstRatio, certify
+from planner.clearance import require_path_clear
 from planner.constraints import jerk_stretch, least_stretch, shares
 from planner.path import JointLine, Path, SplinePath
 from planner.time_law import Motion, TimeLaw
@@ -76,7 +77,7 @@ def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | 
     """A motion along each path, from rest to rest, of the duration that is asked for in all.
 
     Raises:
-        InfeasibleError: the duration is too short, or no motion keeps the drives' limits.
+        InfeasibleError: the duration is too short, no motion keeps the drives' limits, or it comes too near to a shape.
     """
     if timing.velocities is not None:
         return (_with_velocities(boom, paths, timing, base),)
@@ -101,6 +102,7 @@ def _least(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> M
         from planner.profiles.cubic_through import cubic_through
 
         motion = cubic_through(boom, path.waypoints, base)
+        require_path_clear(boom, motion.path)  # another path than the one that was looked at
     else:
         motion = Motion(path, _law(boom, path, timing, base))
     if isinstance(path, JointLine) and timing.profile is not Profile.TIME_OPTIMAL:
@@ -135,7 +137,14 @@ def _law(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> Tim
             from planner.profiles.time_optimal import time_optimal, with_jerk_bound
 
             law = within_average_torque(boom, path, base) if timing.average_torque else time_optimal(boom, path, base)
-            return with_jerk_bound(boom, path, law, base) if timing.jerk_bound else law
+            if not timing.jerk_bound:
+                return law
+            smooth = with_jerk_bound(boom, path, law, base)
+            if timing.average_torque:
+                return smooth
+            from planner.profiles.jerk_limited import evenly_limited
+
+            return min(smooth, evenly_limited(boom, path, base)[0], key=lambda each: each.duration)
 
 
 def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | None) -> Motion:
@@ -148,10 +157,11 @@ def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, base: Ba
         given = None if velocities is None else velocities.shape
         raise InputError(f"velocities have shape {given}; with {count} waypoints without a stop it must be ({count}, 5)")
     motion = cubic_with_velocities(boom, path.waypoints, velocities, timing.duration, base)
-    if timing.rate is None:
-        return motion
-    whole = float(np.ceil(motion.duration * timing.rate * (1.0 - _ROUNDING)) / timing.rate)
-    return cubic_with_velocities(boom, path.waypoints, velocities, whole, base)
+    if timing.rate is not None:
+        whole = float(np.ceil(motion.duration * timing.rate * (1.0 - _ROUNDING)) / timing.rate)
+        motion = cubic_with_velocities(boom, path.waypoints, velocities, whole, base)
+    require_path_clear(boom, motion.path)
+    return motion
 
 
 def _too_short(

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 STEP = 0.01
 """Default sampling step [s], the thesis's (section 3.5)."""
 
+_ROUNDING = 1e-9  # relative; a whole number of steps is not one more for rounding
 MOST_SAMPLES = 10_000_000
 """Samples that a motion may have: a day at a controller's 100 Hz."""
 
@@ -96,7 +97,8 @@ def sample(motion: Motion, step: float = STEP) -> Trajectory:
     if not float(checked("step", step)) > 0.0:
         raise InputError(f"step is {step} s; it must be above 0 s")
     check_size(motion.duration, step)
-    t = np.linspace(0.0, motion.duration, int(np.ceil(motion.duration / step)) + 1)
+    intervals = max(1, int(np.ceil(motion.duration / step * (1.0 - _ROUNDING))))
+    t = np.linspace(0.0, motion.duration, intervals + 1)
     q, qd, qdd, qddd = motion(t)
     return Trajectory.from_samples(t, q, qd, qdd, qddd if motion.law.jerk_limited else None)
 

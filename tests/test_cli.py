@@ -3,13 +3,14 @@
 import json
 import os
 import sys
+from dataclasses import asdict
 
 import numpy as np
 import pytest
 
 from boom_model import Boom, inverse_dynamics
 from boom_model.boom_file import BOOM_FILE
-from planner import cli, plan, read_csv
+from planner import Profile, cli, plan, read_csv
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def test_plan_does_the_main_job(boom, tmp_path):
     np.testing.assert_array_equal(read_csv("move.csv").q, expected.trajectory.q)
 
 
-@pytest.mark.parametrize("profile", ["cubic", "time-optimal", "jerk-limited"])
+@pytest.mark.parametrize("profile", Profile)
 def test_plan_as_json_prints_one_object(boom, profile):
     code, out, _ = boom("plan", "transport", "tip=1.4,0,1.0", "--hold", "extension=0.25", "--profile", profile, "--json")
     answer = json.loads(out)
@@ -56,6 +57,100 @@ def test_plan_takes_payload_duration_and_boom(boom, tmp_path):
     assert code == 0
     light = plan(Boom.load().with_payload(5.0), "transport", "phenotyping", duration=7.0).report
     assert json.loads(out)["checks"] == json.loads(json.dumps(light.to_json({})))["checks"]
+
+
+def test_the_profiles_to_choose_from_are_the_planners():
+    (option,) = [each for each in cli.cli.commands["plan"].params if each.name == "profile"]
+    assert list(option.type.choices) == [profile.value for profile in Profile]
+
+
+VIA = ("--via", "q=40,30,90,0.3,-10")
+
+
+@pytest.mark.parametrize(
+    ("options", "same"),
+    [
+        ((*VIA, "--pass-via", "--profile", "quintic"), {"profile": "quintic", "stop_at_via": False}),
+        (
+            (*VIA, "--via-velocity", "10,8,15,0.1,-5"),
+            {"via_velocities": [[*np.radians([10.0, 8.0, 15.0]), 0.1, np.radians(-5.0)]]},
+        ),
+        (("--profile", "time-optimal", "--jerk-bound", "--rate", "50"), {"jerk_bound": True, "rate": 50.0}),
+        (("--profile", "time-optimal", "--average-torque", "--payload", "5"), {"average_torque": True}),
+    ],
+    ids=["pass-via", "via-velocity", "jerk-bound", "average-torque"],
+)
+def test_options_of_plan_are_those_of_the_library(boom, options, same):
+    code, out, err = boom("plan", "transport", "phenotyping", *options, "--csv", "move.csv", "--json")
+    answer = json.loads(out)
+    model = Boom.load().with_payload(5.0) if "--payload" in options else Boom.load()
+    if "--via" in options:
+        same = same | {"via": [np.array([*np.radians([40.0, 30.0, 90.0]), 0.3, np.radians(-10.0)])]}
+    move = plan(model, "transport", "phenotyping", **{"profile": answer["profile"]} | same)
+    assert err == ""
+    np.testing.assert_allclose(read_csv("move.csv").q, move.trajectory.q, rtol=0, atol=1e-12)
+    assert answer["duration_s"] == pytest.approx(move.report.duration, rel=1e-12)
+    assert code == (1 if answer["verdict"] == "FAIL" else 0)
+    certificate = answer["certificate"]
+    assert set(certificate) == {"samples", "worst", "iterations", "residual"}
+    assert certificate["samples"] >= 20_000
+    assert {"position", "lower - inner", "velocity", "acceleration", "motor torque"} <= {
+        w["limit"] for w in certificate["worst"]
+    }
+    for worst in certificate["worst"]:
+        assert set(worst) == {"limit", "joint", "ratio", "at_s"}
+        assert worst["ratio"] <= 1.001
+        assert 0.0 <= worst["at_s"] <= answer["duration_s"] + 1e-9
+    assert answer["stop"] == json.loads(json.dumps(asdict(move.report.stop)))
+    assert set(answer["stop"]) == {"time_s", "time_at_s", "time_way", "distance_m", "distance_at_s", "distance_way"}
+    assert (answer["remedies"] == []) == (answer["verdict"] != "FAIL")
+
+
+def test_certificate_and_stop_are_printed_for_people(boom):
+    _, out, _ = boom("plan", "transport", "phenotyping")
+    assert "Worst ratio to each limit" in out
+    assert "Certificate: recomputed at 2" in out
+    assert "Stopping: at worst " in out
+
+
+def test_a_plan_that_fails_says_what_would_mend_it(boom):
+    hasty = ("plan", "transport", "phenotyping", "--duration", "4.5")
+    code, out, err = boom(*hasty)
+    assert code == 1
+    assert "needs at least 5 s" in err
+    assert "Would mend it: a duration of 5 s instead of 4.5 s" in out
+    code, out, _ = boom(*hasty, "--json")
+    answer = json.loads(out)
+    assert code == 1
+    assert "a duration of 5 s instead of 4.5 s" in answer["remedies"]
+    assert answer["verdict"] == "FAIL"
+
+
+def test_profiles_stand_side_by_side(boom):
+    code, out, _ = boom("profiles", "transport", "phenotyping", "--json")
+    rows = {row["profile"]: row for row in json.loads(out)["profiles"]}
+    assert code == 0
+    assert list(rows) == [*Profile, "time-optimal, jerk bound"]
+    for name, row in rows.items():
+        options = {"profile": "time-optimal", "jerk_bound": True} if "bound" in name else {"profile": name}
+        report = plan(Boom.load(), "transport", "phenotyping", **options).report
+        worst = {each.limit: each.ratio for each in report.certificate.worst}
+        assert row["duration_s"] == pytest.approx(report.duration, rel=1e-12)
+        assert (row["stop_s"], row["stop_m"]) == (report.stop.time_s, report.stop.distance_m)
+        assert row["velocity"] == worst["velocity"] <= 1.001
+        assert row["gearbox_torque"] == worst["gearbox torque"]
+        assert row["motor_torque"] == worst["motor torque"]
+        # The acceleration of a cubic and of both bang-bang laws jumps: it takes an infinite jerk.
+        assert (row["jerk"] is None) == (name in ("cubic", "trapezoidal", "time-optimal"))
+    # The quintic's jerk peaks at 60 d/T^3 at its ends: the lower link's 150 degrees against its limit decide.
+    limits, move = Boom.load().limits, Boom.load().pose("phenotyping") - Boom.load().pose("transport")
+    expected = (60.0 * np.abs(move) / rows["quintic"]["duration_s"] ** 3 / limits.jerk).max()
+    assert rows["quintic"]["jerk"] == pytest.approx(expected, rel=1e-6)
+    code, out, _ = boom("profiles", "transport", "phenotyping")
+    assert code == 0
+    for name, row in rows.items():
+        assert any(name.split(",")[0] in line and f"{row['duration_s']:.3f} s" in line for line in out.splitlines())
+    assert out.count("jumps") == 3
 
 
 def test_vehicle_is_taken_by_plan_and_check(boom):
@@ -177,6 +272,12 @@ def test_validate_holds(boom):
         (("plan", "transport", "phenotyping", "--duration", "1e9"), 2, "make more than 10,000,000 samples"),
         (("plan", "transport", "phenotyping", "--along", "line"), 2, "is no tip target"),
         (("check", "twice.csv"), 2, "has twice the column q1"),
+        (("plan", "transport", "phenotyping", "--jerk-bound"), 2, "jerk_bound is for the time-optimal profile"),
+        (("plan", "transport", "phenotyping", "--average-torque"), 2, "average_torque is for the time-optimal profile"),
+        (("plan", "transport", "phenotyping", "--rate", "-5"), 2, "rate is -5 Hz"),
+        (("plan", "transport", "phenotyping", "--via-velocity", "1,2,3,4"), 2, "has 4 numbers"),
+        (("plan", "transport", "phenotyping", "--via-velocity", "1,2,3,4,5"), 2, "with 0 waypoints"),
+        (("profiles", "transport", "parking"), 2, "unknown pose 'parking'"),
         (("dance",), 2, "No such command 'dance'"),
     ],
 )

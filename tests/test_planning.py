@@ -7,6 +7,7 @@ import pytest
 
 from boom_model import Boom, FixedExtension, InputError, forward_kinematics
 from planner import Profile, TipTarget, Verdict, check, plan
+from tests.limits import worst
 
 BOOM = Boom.load()
 
@@ -74,6 +75,33 @@ def test_report_as_json_has_the_documented_form():
     assert {"profile", "duration_s", "verdict", "checks", "files"} <= set(answer)
     keys = {"joint", "check", "demand", "limit", "unit", "margin", "required_margin", "at_s", "verdict", "basis", "source"}
     assert all(set(row) == keys for row in answer["checks"])
+
+
+@pytest.mark.parametrize("rate", [3.0, 60.0, 250.0])
+@pytest.mark.parametrize("profile", Profile)
+def test_a_controllers_rate_puts_samples_and_stops_on_its_clock(profile, rate):
+    via = np.array([0.7, 0.5, 2.0, 0.4, -0.2])
+    move = plan(BOOM, "transport", "phenotyping", profile=profile, via=[via], rate=rate)
+    t = move.trajectory.t
+    np.testing.assert_allclose(t * rate, np.arange(len(t)), rtol=0, atol=1e-9 * len(t))
+    free = plan(BOOM, "transport", "phenotyping", profile=profile, via=[via])
+    for clocked, least in zip(move.motions, free.motions, strict=True):
+        periods = clocked.duration * rate
+        assert periods == pytest.approx(np.ceil(least.duration * rate * (1.0 - 1e-9)), abs=1e-6)
+    stopped = round(move.motions[0].duration * rate)
+    np.testing.assert_allclose(move.trajectory.q[stopped], via, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(move.trajectory.qd[stopped], 0.0, atol=1e-9)
+    assert not move.report.certificate.broken
+    for motion in move.motions:
+        found = worst(BOOM, motion, 2e-3, jerk=motion.law.jerk_limited)
+        assert found.pop("outside") <= 1e-12
+        assert max(found.values()) <= 1.001
+
+
+def test_a_controllers_rate_rounds_a_given_duration_up():
+    move = plan(BOOM, "transport", "phenotyping", duration=6.005, rate=100.0)
+    assert move.report.duration == pytest.approx(6.01, rel=1e-12)
+    assert plan(BOOM, "transport", "phenotyping", duration=6.0, rate=100.0).report.duration == pytest.approx(6.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(

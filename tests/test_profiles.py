@@ -7,13 +7,15 @@ import pytest
 
 from boom_model import Boom, InfeasibleError, inverse_dynamics
 from boom_model.drives import reflected_inertia
-from planner import InfeasiblePathError, Profile, plan, sample
+from planner import InfeasiblePathError, JointLine, Profile, plan, sample
 from planner.constraints import motor_limits
+from planner.timing import Timing, timed
 
 BOOM = Boom.load()
 LIMITS = BOOM.limits
 BARE = replace(BOOM, drives=(None,) * 5)
 SLACK = 1.001
+VIA = np.array([0.7, 0.5, 2.0, 0.4, -0.2])
 
 
 def worst_ratios(move):
@@ -39,10 +41,16 @@ def random_pairs(count: int):
             yield pair
 
 
-def single_joint_move(joint: int):
+def straight(boom, start, goal, profile, **options):
+    """The motion alone, without the checks of a whole plan."""
+    (motion,) = timed(boom, [JointLine(start, goal)], Timing.of(profile, **options), None)
+    return motion
+
+
+def single_joint_move(joint: int, distance: float = 0.5):
     start = np.array([1.0, 0.5, 1.5, 0.3, 0.1])
     goal = start.copy()
-    goal[joint] += 0.5
+    goal[joint] += distance
     return start, goal
 
 
@@ -77,6 +85,71 @@ def test_jerk_limited_duration_is_the_closed_form(joint):
     else:
         expected = 4.0 * np.cbrt(d / (2.0 * j))
     assert move.report.duration == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("joint", range(5))
+@pytest.mark.parametrize("distance", [0.004, 0.5])
+def test_quintic_duration_is_the_closed_form(joint, distance):
+    """Its speed peaks at 15/8 d/T in the middle, its acceleration at 10/sqrt(3) d/T^2."""
+    start, goal = single_joint_move(joint, distance)
+    move = plan(BARE, start, goal, profile="quintic")
+    v, a = LIMITS.velocity[joint], LIMITS.acceleration[joint]
+    expected = max(15.0 / 8.0 * distance / v, np.sqrt(10.0 / np.sqrt(3.0) * distance / a))
+    assert move.report.duration == pytest.approx(expected, rel=1e-6)
+    np.testing.assert_allclose(move.motions[0]([0.0, expected])[2], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("joint", range(5))
+@pytest.mark.parametrize("distance", [0.004, 0.5])
+def test_trapezoidal_duration_is_the_closed_form(joint, distance):
+    start, goal = single_joint_move(joint, distance)
+    move = plan(BARE, start, goal, profile="trapezoidal")
+    v, a = LIMITS.velocity[joint], LIMITS.acceleration[joint]
+    expected = distance / v + v / a if v * v / a < distance else 2.0 * np.sqrt(distance / a)
+    assert move.report.duration == pytest.approx(expected, rel=1e-9)
+
+
+def straight_pairs():
+    for joint in range(5):
+        for distance in (0.01, 0.16, 0.5):
+            yield single_joint_move(joint, distance)
+    yield from random_pairs(10)
+
+
+@pytest.mark.parametrize(("start", "goal"), list(straight_pairs()))
+def test_jerk_bounded_time_optimal_is_ruckigs_optimum_on_a_straight_path_without_drives(start, goal):
+    """Short moves and long ones: with and without a time at full speed or at full acceleration."""
+    from ruckig import InputParameter, Result, Ruckig, Trajectory
+
+    problem = InputParameter(1)
+    problem.current_position, problem.target_position = [0.0], [1.0]
+    step = np.abs(goal - start)
+    for name in ("velocity", "acceleration", "jerk"):
+        with np.errstate(divide="ignore"):
+            setattr(problem, f"max_{name}", [float((getattr(LIMITS, name) / step).min())])
+    solver, solution = Ruckig(1), Trajectory(1)
+    assert solver.calculate(problem, solution) == Result.Working
+    motion = straight(BARE, start, goal, Profile.TIME_OPTIMAL, jerk_bound=True)
+    assert motion.duration == pytest.approx(solution.duration, rel=1e-3)
+
+
+def test_jerk_bound_keeps_the_path_the_jerk_limits_and_the_rest():
+    """The jerk by differences of the positions alone, under a payload with which the drives decide."""
+    boom = BOOM.with_payload(20.0)
+    start, goal = boom.pose("transport"), boom.pose("phenotyping")
+    motion = straight(boom, start, goal, Profile.TIME_OPTIMAL, jerk_bound=True)
+    t = np.linspace(0.0, motion.duration, 20_001)
+    q, qd, qdd, _ = motion(t)
+    h = t[1]
+    jerk = np.abs(np.diff(qdd, axis=0)) / h / LIMITS.jerk
+    assert 0.99 < jerk.max() <= SLACK
+    np.testing.assert_allclose(np.diff(q, axis=0) / h, (qd[1:] + qd[:-1]) / 2.0, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(np.diff(qd, axis=0) / h, (qdd[1:] + qdd[:-1]) / 2.0, rtol=0, atol=1e-4)
+    np.testing.assert_allclose(qdd[[0, -1]], 0.0, atol=1e-9)
+    along = (q - start) @ (goal - start) / ((goal - start) @ (goal - start))
+    np.testing.assert_allclose(q, start + along[:, None] * (goal - start), rtol=0, atol=1e-9)
+    sharp, slow = (straight(boom, start, goal, profile).duration for profile in (Profile.TIME_OPTIMAL, Profile.JERK_LIMITED))
+    assert sharp < motion.duration <= slow * (1.0 + 1e-6)
 
 
 @pytest.mark.parametrize("profile", Profile)
@@ -155,12 +228,24 @@ def test_given_duration_is_met_and_a_shorter_one_than_the_least_refused(profile)
         plan(BOOM, "transport", "phenotyping", profile=profile, duration=1.0)
 
 
-@pytest.mark.parametrize("profile", Profile)
-def test_no_profile_reaches_for_the_network(profile, monkeypatch):
+@pytest.mark.parametrize(
+    "options",
+    [
+        *({"profile": profile} for profile in Profile),
+        *({"profile": profile, "via": [VIA], "stop_at_via": False} for profile in Profile),
+        {"profile": "cubic", "via": [VIA], "via_velocities": [[0.1, 0.1, 0.2, 0.1, 0.1]]},
+        {"profile": "time-optimal", "jerk_bound": True, "rate": 100.0},
+        {"profile": "time-optimal", "average_torque": True, "duration": 9.0},
+    ],
+    ids=str,
+)
+def test_no_profile_reaches_for_the_network(options, monkeypatch):
     import socket
 
     def refuse(*_, **__):
-        raise AssertionError("a socket was opened")
+        raise AssertionError("the network was reached for")
 
-    monkeypatch.setattr(socket, "socket", refuse)
-    plan(BOOM, "transport", "phenotyping", profile=profile)
+    for name in ("socket", "create_connection", "getaddrinfo"):
+        monkeypatch.setattr(socket, name, refuse)
+    move = plan(BOOM, "transport", "phenotyping", **options)
+    assert move.report.stop is not None  # stopping asks ruckig as well

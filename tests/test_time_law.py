@@ -55,3 +55,90 @@ def test_pieces_without_duration_are_left_out():
 def test_motion_is_clipped_to_its_ends():
     motion = Motion(JointLine(START, GOAL), cubic_law(2.0))
     np.testing.assert_array_equal(motion([-1.0, 3.0])[0], [START, GOAL])
+
+
+RAMP = 2.0 / 3.0  # of the trapezoid's acceleration, over 0.5 s, 1 s of cruise between
+LAWS = {
+    "trapezoid": TimeLaw.from_pieces([0.5, 1.0, 0.5], [[RAMP, 0.0, -RAMP], [0.0, RAMP, RAMP], [0.0, 1.0 / 6.0, 5.0 / 6.0]]),
+    "cubic": cubic_law(1.7),
+    "triangle": TimeLaw.from_pieces([1.0, 1.0], [[0.5, -0.5], [0.0, 1.0], [0.0, 0.5]]),
+}
+
+
+def held_at_ends(law: TimeLaw, t):
+    """s at any time: 0 before the law begins and 1 after it has ended."""
+    return np.where(t < 0.0, 0.0, np.where(t > law.duration, 1.0, law.s(np.clip(t, 0.0, law.duration))))
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("width", [0.03, 0.5, 1.0, 3.0])
+def test_averaged_law_is_the_convolution_with_a_window(name, width):
+    law = LAWS[name]
+    found = law.averaged(width)
+    assert found.duration == pytest.approx(law.duration + width, rel=1e-12)
+    nodes, weights = np.polynomial.legendre.leggauss(4)  # exact for a piece of up to seventh order
+    for t in np.linspace(0.0, found.duration, 41):
+        breaks = np.unique(np.clip([*law.s.x, t - width, t], t - width, t))
+        half, middle = np.diff(breaks)[:, None] / 2.0, (breaks[:-1] + breaks[1:])[:, None] / 2.0
+        expected = float((half * weights * held_at_ends(law, middle + half * nodes)).sum()) / width
+        assert float(found.s(t)) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("width", [0.03, 0.5, 3.0])
+def test_averaged_law_runs_from_0_to_1_with_a_continuous_acceleration_that_is_0_at_both_ends(name, width):
+    law = LAWS[name]
+    found = law.averaged(width)
+    end = found.duration
+    np.testing.assert_allclose(found.s([0.0, end]), [0.0, 1.0], rtol=0, atol=1e-12)
+    for order in (1, 2):
+        np.testing.assert_allclose(found.s([0.0, end], order), 0.0, rtol=0, atol=1e-10)
+    inner = found.s.x[1:-1]
+    for order in range(3):  # just before and just after each break
+        before, after = found.s(inner - 1e-9, order), found.s(inner + 1e-9, order)
+        np.testing.assert_allclose(before, after, rtol=0, atol=1e-6)
+    t = np.linspace(0.0, end, 4001)
+    old = np.linspace(0.0, law.duration, 4001)
+    assert (np.diff(found.s(t)) >= -1e-15).all()
+    assert found.s(t, 1).max() <= law.s(old, 1).max() + 1e-12
+    accelerations = np.append(law.s(old, 2), 0.0)
+    assert np.abs(found.s(t, 3)).max() <= np.ptp(accelerations) / width * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.25, 0.6, 0.99])
+def test_what_is_left_of_a_law_is_the_law(name, share):
+    law = LAWS[name]
+    at = share * law.duration
+    rest = law.after(at)
+    t = np.linspace(0.0, law.duration - at, 57)
+    assert rest.duration == pytest.approx(law.duration - at, rel=1e-13)
+    for order in range(4):
+        inside = t[1:-1] + 1e-7  # off the breaks, where a jump belongs to the piece that follows
+        inside = inside[inside < rest.duration]
+        np.testing.assert_allclose(rest.s(inside, order), law.s(at + inside, order), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_law_on_other_breaks_is_the_same_and_rests_after_its_end(name):
+    from scipy.interpolate import PPoly
+
+    law = LAWS[name]
+    breaks = np.union1d(law.s.x, np.array([0.123, 0.77, law.duration + 0.5, law.duration + 2.0]))
+    found = PPoly(law.on(breaks), breaks)
+    t = np.linspace(0.0, law.duration, 101)[1:-1] + 1e-7
+    for order in range(4):
+        np.testing.assert_allclose(found(t, order), law.s(t, order), rtol=0, atol=1e-12)
+    late = law.duration + np.array([0.1, 0.6, 1.9])
+    np.testing.assert_allclose(found(late), 1.0, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(found(late, 1), 0.0)
+
+
+def test_times_see_both_sides_of_a_jump():
+    law = LAWS["trapezoid"]
+    a = 2.0 * RAMP
+    at = law.times(3)
+    assert len(at) == 3 * 3 + 1
+    np.testing.assert_allclose(at, [0, 0.25, 0.5, 0.5, 1.0, 1.5, 1.5, 1.75, 2.0, 2.0], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(law.s(at, 2), [a, a, a, 0, 0, 0, -a, -a, -a, -a], rtol=0, atol=1e-12)
+    assert (np.diff(at) > 0.0).sum() == len(at) - 1

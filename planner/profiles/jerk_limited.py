@@ -16,9 +16,27 @@ _ROUNDING = 1e-9
 def jerk_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
     """A law from rest to rest under velocity, acceleration and jerk limits, and the drives' own.
 
-    ruckig's, with one law s(t) for all joints and its limits the least of limit / |p'| over joints and path: the least-time
-    one where the path is straight and no drive limits. Elsewhere it must be slowed evenly, and the time-optimal law
-    with its jerk bounded can be the faster of the two: then that is taken.
+    ruckig's: the least-time one where the path is straight and no drive limits. Elsewhere it must be slowed, and the
+    time-optimal law with its jerk bounded can be the faster of the two: then that is taken.
+
+    Raises:
+        InfeasibleError: ruckig found no law; carries its result.
+    """
+    law, slowed = evenly_limited(boom, path, base)
+    if slowed <= 1.0 + _ROUNDING:
+        return law
+    try:
+        other = with_jerk_bound(boom, path, time_optimal(boom, path, base), base)
+    except InfeasibleError:  # a drive cannot hold the load: no law mends it, and the checks say so
+        return law
+    return min(law, other, key=lambda each: each.duration)
+
+
+def evenly_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> tuple[TimeLaw, float]:
+    """ruckig's law, and by how much it had to be slowed.
+
+    One law s(t) for all joints, its limits the least of limit / |p'| over joints and path, slowed evenly where the path's
+    curvature or a drive asks for it.
 
     Raises:
         InfeasibleError: ruckig found no law; carries its result.
@@ -34,10 +52,4 @@ def jerk_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> Time
         raise InfeasibleError(f"no jerk-limited motion: ruckig answers {result.name}")
     law = TimeLaw.from_pieces(*pieces(solution.profiles[0][0]), jerk_limited=True).stretched(unit)
     slowed = max(1.0, least_stretch(boom, path, law, base), jerk_stretch(boom, path, law))
-    if slowed <= 1.0 + _ROUNDING:
-        return law.stretched(slowed)
-    try:
-        other = with_jerk_bound(boom, path, time_optimal(boom, path, base), base)
-    except InfeasibleError:  # a drive cannot hold the load: no law mends it, and the checks say so
-        return law.stretched(slowed)
-    return min(law.stretched(slowed), other, key=lambda each: each.duration)
+    return law.stretched(slowed), slowed

@@ -142,7 +142,7 @@ def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | Non
     Averaging s(t) neither leaves the path nor starts or ends in motion, makes the acceleration continuous and 0 at both ends,
     and bounds the jerk by the jump of the acceleration over the window. What it shifts past a limit an even slowing mends; the
     window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
-    makes the least-time jerk-limited one; elsewhere it is not the optimum.
+    makes the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is not the optimum.
     """
     from scipy.optimize import minimize_scalar
 
