@@ -1,10 +1,11 @@
 """From targets to motions that have been checked, and to what people keep of them: reports, recordings, CSV."""
 
-from planner.checks import Row, Verdict, average_torque
+from planner.checks import average_torque
 from planner.constraints import InfeasiblePathError
 from planner.path import JointLine, Path
 from planner.planning import Move, Profile, check, plan
 from planner.report import Report
+from planner.rows import Row, Verdict
 from planner.targets import TipTarget, parse_hold, parse_pitch, parse_target
 from planner.time_law import Motion, TimeLaw
 from planner.trajectory import Trajectory, read_csv, sample, write_csv
