@@ -53,7 +53,7 @@ def check_rows(
     for i in range(5):
         rows += _position_rows(boom, trajectory, i)
         rows += _rate_rows(boom, trajectory, i)
-    views = joint_views(boom, trajectory, loads, M, base=base, payload_as=payload_as, shock=shock, bases=bases, duty=duty)
+    views = joint_views(boom, trajectory, loads.tau, M, base=base, payload_as=payload_as, shock=shock, bases=bases, duty=duty)
     for view, drive in zip(views, boom.drives, strict=True):
         if drive is not None:
             rows += drive_rows(view, drive, shock)
@@ -69,7 +69,7 @@ def check_rows(
 def joint_views(
     boom: Boom,
     trajectory: Trajectory,
-    loads: Loads,
+    tau: Array,
     M: Array | None = None,
     *,
     base: BaseMotion | None = None,
@@ -78,7 +78,13 @@ def joint_views(
     bases: tuple[Basis, ...] = (),
     duty: Duty | None = None,
 ) -> tuple[JointView, ...]:
-    """The motion as each joint sees it; arguments as of `check_rows`, and its mass matrix (m, 5, 5) where it is known."""
+    """The motion as each joint sees it.
+
+    Args:
+        tau: (n, 5) the motion's torques.
+        M: (m, 5, 5) mass matrix at some of its poses; None computes it.
+        base, payload_as, shock, bases, duty: as of `check_rows`.
+    """
     still = np.zeros_like(trajectory.q)
     tilt = None if base is None else BaseMotion.of(up=base.up)
     static = inverse_dynamics(boom, trajectory.q, still, still, base=tilt, payload_as=payload_as, reactions=False).tau
@@ -90,8 +96,8 @@ def joint_views(
             is_length=bool(IS_LENGTH[i]),
             trajectory=trajectory,
             duty=Duty.alone(trajectory.t) if duty is None else duty,
-            tau=loads.tau[:, i],
-            calm=loads.tau[:, i] if shock is None else shock.calm[:, i],
+            tau=tau[:, i],
+            calm=tau[:, i] if shock is None else shock.calm[:, i],
             friction=friction.viscous[i] * trajectory.qd[:, i] + friction.coulomb[i] * np.sign(trajectory.qd[:, i]),
             coulomb=float(friction.coulomb[i]),
             static=static[:, i],

@@ -159,7 +159,7 @@ def _resonance_row(view: JointView, drive: Drive) -> Row:
 
 
 def longest_dwell(t: Array, speed: Array, low: float, high: float) -> tuple[float, float | None]:
-    """The longest time without a break that speed (n,) stays between low and high, and when it starts; linear between samples."""
+    """Longest time without a break that speed (n,) is between low and high, and its start; linear between samples."""
     if t.size < 2:
         return 0.0, None
     least, most = np.minimum(speed[:-1], speed[1:]), np.maximum(speed[:-1], speed[1:])

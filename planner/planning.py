@@ -85,6 +85,7 @@ def plan(
     via: Sequence[Target] = (),
     along: Along = "joint",
     vehicle: VehicleCase | None = None,
+    reference: ArrayLike | None = None,
     step: float = STEP,
 ) -> Move:
     """A move from start to goal, rest to rest, checked on a grid finer than its samples.
@@ -98,6 +99,7 @@ def plan(
         along: "joint" goes straight in joint space; "line" leads the tip straight from tip target to tip target at constant
             pitch; a point (3,) [m] leads it along the arc of a circle through that point.
         vehicle: what the vehicle does during the move. The plan knows its slope; track and shock are in the checks alone.
+        reference: joint position (5,) that the start of a tip line or arc is nearest to; None is the middle of the ranges.
         step: sampling step [s].
 
     Raises:
@@ -114,7 +116,7 @@ def plan(
     if duration is not None:
         check_size(duration, step)
     hold = ActuatorHorizontal() if hold is None else hold
-    paths = _paths(boom, (start, *via, goal), pitch, hold, along)
+    paths = _paths(boom, (start, *via, goal), pitch, hold, along, reference)
     if not paths:
         q = resolve(boom, start, pitch, hold)
         note = "start and goal are the same joint position: an empty move, of no duration"
@@ -131,7 +133,9 @@ def plan(
     return _move(boom, profile, vehicle, coarse, fine, motions)
 
 
-def _paths(boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, along: Along) -> list[Path]:
+def _paths(
+    boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, along: Along, reference: ArrayLike | None
+) -> list[Path]:
     """A path between each target and the next, on branches that go on from each other; none between equal positions."""
     if isinstance(along, str) and along == "joint":
         stops: list[Array] = []
@@ -146,7 +150,7 @@ def _paths(boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hol
         raise InputError("a line or an arc of the tip goes at constant pitch, which must be given")
     places = [_place(target) for target in targets]
     paths: list[Path] = []
-    last: Array | None = None
+    last = reference
     for a, b in pairwise(places):
         if np.array_equal(a, b):
             continue
@@ -201,13 +205,13 @@ def check(
     )
 
 
-def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass") -> Array:
-    """Joint torques (n, 5) of a motion on level ground, with the joints' friction where it is known.
+def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None) -> Array:
+    """Joint torques (n, 5) of a motion, on level ground without a vehicle, with the joints' friction where it is known.
 
     Raises:
         InputError: as `inverse_dynamics`, or a torque is not finite.
     """
-    return _loads(boom, trajectory, None, payload_as)[0].tau
+    return _loads(boom, trajectory, vehicle, payload_as)[0].tau
 
 
 def _loads(

@@ -119,7 +119,7 @@ def cells(row: Row) -> tuple[str, ...]:
         "-" if row.demand is None else f"{row.demand * factor:.4g} {unit}".rstrip(),
         "-" if row.limit is None else f"{row.limit * factor:.4g} {unit}".rstrip(),
         margin,
-        f"{row.required_margin:.0%}",
+        "-" if row.verdict is Verdict.INFO else f"{row.required_margin:.0%}",
         "-" if row.at_s is None else f"{row.at_s:.2f} s",
         row.verdict,
         row.basis or "-",
