@@ -1,4 +1,4 @@
-"""The drives' page: torque-speed plane, gearbox torque and margins of each motor, as a picture."""
+"""The drives' page: torque-speed plane, gearbox torque and margins of each motor, and the tip's budget, as a picture."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from boom_model import JOINTS, Boom, Drive, InputError
+from boom_model import JOINTS, Boom, Drive, InputError, tip_deflection
 from boom_model.arrays import Array
 from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque
 from planner.files import replacing
@@ -46,7 +46,7 @@ def drive_picture(boom: Boom, trajectory: Trajectory, tau: Array, report: Report
     """A PNG with a row of three panels for each joint that has a motor.
 
     Left the motor's torque-speed plane with the motion in it, there and, where it can be run so, back; in the middle the
-    gearbox's torque over time beside its ratings; right the margins of the joint's checks.
+    gearbox's torque over time beside its ratings; right the margins of the joint's checks. Below, the tip's error budget.
 
     Args:
         tau: (n, 5) the motion's torques.
@@ -62,18 +62,23 @@ def drive_picture(boom: Boom, trajectory: Trajectory, tau: Array, report: Report
     driven = [(i, drive) for i, drive in enumerate(boom.drives) if drive is not None]
     if not driven:
         raise InputError(f"{boom.name} has no motor to show")
-    figure = Figure(figsize=(18.0, 0.9 + 6.4 * len(driven)), dpi=90, layout="constrained")
+    figure = Figure(figsize=(18.0, 6.0 * len(driven) + 4.2), dpi=90)
     FigureCanvasAgg(figure)
-    panels = figure.subplots(len(driven), 3, squeeze=False, width_ratios=(1.0, 1.0, 0.9))
+    high = figure.get_figheight()
+    ratios = [1.0] * len(driven) + [0.5]
+    margin = {"left": 0.04, "right": 0.985, "bottom": 0.85 / high, "top": 1.0 - 0.75 / high}
+    widths = (1.0, 1.0, 0.22, 0.9)  # the names of the bars stand in the third
+    grid = figure.add_gridspec(len(ratios), 4, height_ratios=ratios, width_ratios=widths, wspace=0.2, hspace=0.36, **margin)
     shown = list(parts) or [slice(0, len(trajectory.t))]
-    for (plane, gearbox, margins), (i, drive) in zip(panels, driven, strict=True):
+    for k, (i, drive) in enumerate(driven):
+        plane, gearbox, margins = (figure.add_subplot(grid[k, column]) for column in (0, 1, 3))
         rows = [row for row in report.rows if row.joint == JOINTS[i] and row.check.startswith(("gearbox", "motor"))]
         _plane(plane, drive, JOINTS[i], tau[:, i], trajectory.qd[:, i], trajectory.qdd[:, i], rows)
         _gearbox(gearbox, drive, JOINTS[i], trajectory.t, tau[:, i], shown, rows)
         _margins(margins, JOINTS[i], rows)
-    figure.suptitle(
-        f"{boom.name}, payload {boom.payload.mass:g} kg: {report.profile}, {report.duration:.3f} s: {report.verdict}"
-    )
+    _tip(figure.add_subplot(grid[-1, :]), boom, trajectory, tau, shown)
+    title = f"{boom.name}, payload {boom.payload.mass:g} kg: {report.profile}, {report.duration:.3f} s: {report.verdict}"
+    figure.suptitle(title, y=1.0 - 0.15 / high, va="top")
     picture = BytesIO()
     figure.savefig(picture, format="png")
     return picture.getvalue()
@@ -111,13 +116,7 @@ def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: A
 
 
 def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts: Sequence[slice], rows: Sequence[Row]) -> None:
-    begin = 0.0
-    for k, part in enumerate(parts):
-        local = t[part] - t[part][0]
-        axes.plot(local + begin, np.abs(tau[part]), color=_THERE, label="torque, size" if k == 0 else None)
-        begin += float(local[-1])
-        if k + 1 < len(parts):
-            axes.axvline(begin, color="#cccccc", linewidth=0.8)
+    _over_time(axes, t, np.abs(tau)[:, None], parts, ["torque, size"], [_THERE])
     gear = drive.gearbox
     ratings = (
         ("rated", gear.continuous_torque, COLORS[Verdict.PASS]),
@@ -130,15 +129,38 @@ def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts
     average = next((row.demand for row in rows if row.check == "gearbox average"), None)
     if average is not None:
         axes.axhline(average, color=_CURVE, linestyle="--", label=f"average of the cycle {average:.0f} Nm")
-    several = len(parts) > 1
-    axes.set(
-        title=f"{joint}: {gear.name}",
-        xlabel="the different moves, end to end [s]" if several else "time [s]",
-        ylabel="gearbox torque, size [Nm]",
-    )
+    axes.set(title=f"{joint}: {gear.name}", ylabel="gearbox torque, size [Nm]")
     axes.set_ylim(bottom=0.0)
-    axes.grid(alpha=0.25)
     _legend_below(axes, 3)
+
+
+def _tip(axes: "Axes", boom: Boom, trajectory: Trajectory, tau: Array, parts: Sequence[slice]) -> None:
+    """The error budget of the tip, its parts and their sum, over time."""
+    budget = tip_deflection(boom, trajectory.q, tau)
+    values = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
+    names = ["wind-up, size", "hysteresis", "backlash", "step error", "in all"]
+    colors = [_THERE, COLORS[Verdict.WARN], COLORS[Verdict.PASS], "#cc79a7", _CURVE]
+    _over_time(axes, trajectory.t, np.stack(values, axis=-1) * 1e3, parts, names, colors)
+    without = " (a joint without a drive adds nothing here)" if budget.uncounted else ""
+    axes.set(title=f"tip: what the drives let it deflect{without}", ylabel="deflection, at most [mm]")
+    axes.set_ylim(bottom=0.0)
+    _legend_below(axes, 5, gap=0.17)
+
+
+def _over_time(
+    axes: "Axes", t: Array, values: Array, parts: Sequence[slice], names: Sequence[str], colors: Sequence[str]
+) -> None:
+    """Curves (n, k) over the time of the parts, end to end."""
+    begin = 0.0
+    for k, part in enumerate(parts):
+        local = t[part] - t[part][0]
+        for curve, name, color in zip(values[part].T, names, colors, strict=True):
+            axes.plot(local + begin, curve, color=color, label=name if k == 0 else None)
+        begin += float(local[-1])
+        if k + 1 < len(parts):
+            axes.axvline(begin, color="#cccccc", linewidth=0.8)
+    axes.set_xlabel("the different moves, end to end [s]" if len(parts) > 1 else "time [s]")
+    axes.grid(alpha=0.25)
 
 
 def _margins(axes: "Axes", joint: str, rows: Sequence[Row]) -> None:
@@ -167,9 +189,9 @@ def _margins(axes: "Axes", joint: str, rows: Sequence[Row]) -> None:
     axes.grid(axis="x", alpha=0.25)
 
 
-def _legend_below(axes: "Axes", columns: int, handles: "Sequence[Patch] | None" = None) -> None:
+def _legend_below(axes: "Axes", columns: int, handles: "Sequence[Patch] | None" = None, gap: float = 0.09) -> None:
     """Clear of the curves."""
-    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.1), "frameon": False}
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -gap), "frameon": False}
     style: dict[str, Any] = {"fontsize": 8, "markerscale": 4, "ncols": columns}
     if handles is None:
         axes.legend(**place, **style)

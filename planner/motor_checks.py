@@ -74,11 +74,19 @@ def _motor_torque_row(view: JointView, drive: Drive, check: str, torque: Array) 
         unknown = Origin(Basis.PRINTED, f"{motor.source}; above low speed only with bus voltage and wiring")
         return view.held(check, most, None, "Nm", at, unknown, STEPPER_MARGIN)
     available = np.full_like(torque, running) if curve is None else curve
-    at = _least_room(available, torque)
-    on_curve = bool(available[at] < running * (1.0 - SAMPLING_SLACK))
-    origin = _curve_origin(drive, "torque-speed curve") if on_curve else slow
-    facts = (float(torque[at]), float(available[at]), "Nm", float(view.t[at]))
-    return view.held(check, *facts, origin, STEPPER_MARGIN, on_curve)
+    on_curve = available < running * (1.0 - SAMPLING_SLACK)
+    rows = []
+    for part, origin, estimated in ((~on_curve, slow, False), (on_curve, _curve_origin(drive, "torque-speed curve"), True)):
+        if part.any():
+            at = int(np.flatnonzero(part)[_least_room(available[part], torque[part])])
+            facts = (float(torque[at]), float(available[at]), "Nm", float(view.t[at]))
+            rows.append(view.held(check, *facts, origin, STEPPER_MARGIN, warn_near=estimated))
+    return max(rows, key=_severity)
+
+
+def _severity(row: Row) -> tuple[int, float]:
+    """The worse verdict first, then the lesser margin: an estimate's warning is not hidden by a sample off the curve."""
+    return (Verdict.PASS, Verdict.WARN, Verdict.FAIL).index(row.verdict), -np.inf if row.margin is None else -row.margin
 
 
 def _quasi_static_row(view: JointView, drive: Drive) -> Row:
@@ -159,7 +167,7 @@ def _resonance_row(view: JointView, drive: Drive) -> Row:
 
 
 def longest_dwell(t: Array, speed: Array, low: float, high: float) -> tuple[float, float | None]:
-    """Longest time without a break that speed (n,) is between low and high, and its start; linear between samples."""
+    """Longest time without a break that speed (n,) is between low and high, and the sample before it; linear between."""
     if t.size < 2:
         return 0.0, None
     least, most = np.minimum(speed[:-1], speed[1:]), np.maximum(speed[:-1], speed[1:])
@@ -167,7 +175,9 @@ def longest_dwell(t: Array, speed: Array, low: float, high: float) -> tuple[floa
     share = np.where(width > 0.0, np.clip(np.divide(inside, width, out=np.ones_like(width), where=width > 0.0), 0.0, 1.0), 0.0)
     share[(width == 0.0) & (inside >= 0.0)] = 1.0
     spent = share * np.diff(t)
-    starts = np.flatnonzero((spent > 0.0) & ~np.concatenate([[False], spent[:-1] > 0.0]))
+    between = (speed[1:-1] >= low) & (speed[1:-1] <= high)  # a stretch goes on where the sample between is inside
+    goes_on = np.concatenate([[False], (spent[:-1] > 0.0) & between])
+    starts = np.flatnonzero((spent > 0.0) & ~goes_on)
     if not len(starts):
         return 0.0, None
     stretches = np.add.reduceat(spent, starts)

@@ -8,6 +8,7 @@
     /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle, which add up to tau
     /plots/motor/<joint>      motor torque, what the torque-speed curve leaves, and that with the stepper's margin [Nm]
     /plots/gearbox/<joint>    gearbox torque and its ratings [Nm]
+    /plots/tip/deflection     what the drives let the tip deflect, in parts and in all [mm]
     /drives                   the page of `drive_pictures`, where a joint has a motor
     /plots/mount/force, moment   of the boom on the mount, along frame 1 [N, Nm]
     .../limits                the limits beside it; those that do not change with the motion at the move's two ends only
@@ -27,7 +28,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from scipy.spatial.transform import Rotation
 
-from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms
+from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms, tip_deflection
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from boom_model.drives import STEPPER_MARGIN, available_torque, drive_inertia, drive_torque_limit, motor_torque
@@ -404,7 +405,7 @@ def _bundles(move: Move) -> dict[str, list[_Bundle]]:
             curves = [f"{name} [{unit}]" for name in names]
             tabs["Mount"].append(_Bundle(f"plots/mount/{kind}", title, curves, colors, np.stack(series, axis=-1)))
     if drives := list(_drive_bundles(move)):
-        tabs["Drives"] = drives
+        tabs["Drives"] = [*drives, _tip_bundle(move)]
     return tabs
 
 
@@ -433,6 +434,18 @@ def _drive_bundles(move: Move) -> Iterator[_Bundle]:
         values = np.stack([tau[:, i], *(np.full(len(tau), value) for value in known.values())], axis=-1)
         colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, COLORS["upper"], LIMIT_COLOR]
         yield _Bundle(f"plots/gearbox/{joint}", f"{joint}, {gear.name} [Nm]", names, colors[: len(names)], values)
+
+
+def _tip_bundle(move: Move) -> _Bundle:
+    """The error budget of the tip [mm]."""
+    budget = tip_deflection(move.boom, move.trajectory.q, move.loads.tau)
+    parts = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
+    names = [f"{name} [mm]" for name in ("wind-up", "hysteresis", "backlash", "step error", "in all")]
+    colors = [COLORS[b] for b in ("inner", "upper", "outer", "end_effector")]
+    values = np.stack(parts, axis=-1) * 1e3
+    return _Bundle(
+        "plots/tip/deflection", "tip's deflection by the drives, at most [mm]", names, [*colors, PAYLOAD_COLOR], values
+    )
 
 
 def _log_bundle(recording: rr.RecordingStream, t: Array, bundle: _Bundle) -> None:
