@@ -217,7 +217,8 @@ def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase | None = None,
             try:
                 leg, after, said = _leg(boom, part, q, vehicle, step)
             except (InputError, InfeasibleError) as error:
-                raise type(error)(f"mission {mission.name}, {where}: {error}") from None
+                kind = InputError if isinstance(error, InputError) else InfeasibleError
+                raise kind(f"mission {mission.name}, {where}: {error}") from None
             if leg is not None:
                 legs.append(leg)
             notes += [f"{leg.label if leg else where}: {sentence}" for sentence in said]

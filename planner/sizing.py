@@ -130,9 +130,7 @@ def candidates(boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[
     Raises:
         InputError: no such joint, or a voltage that is not a positive number.
     """
-    if joint not in JOINTS:
-        raise InputError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
-    i = JOINTS.index(joint)
+    i = _index(joint)
     if IS_LENGTH[i]:
         brake = None if boom.actuator is None else boom.actuator.brake
         return tuple(LinearDrive(actuator, brake) for actuator in catalogue.actuators.values())
@@ -241,8 +239,12 @@ def with_drive(boom: Boom, joint: str, drive: Drive | LinearDrive) -> Boom:
 
 
 def fitted(boom: Boom, cycle: Cycle, joint: str, payload_as: PayloadAs = "mass") -> Judged | None:
-    """The drive that a joint has, held against a mission; None where it has none."""
-    i = JOINTS.index(joint)
+    """The drive that a joint has, held against a mission; None where it has none.
+
+    Raises:
+        InputError: no such joint.
+    """
+    i = _index(joint)
     drive = boom.actuator if IS_LENGTH[i] else boom.drives[i]
     return None if drive is None else _judged(boom, cycle, joint, drive, _view(boom, cycle, joint, payload_as))
 
@@ -265,6 +267,12 @@ def parse_variant(boom: Boom, text: str) -> Boom:
     return boom
 
 
+def _index(joint: str) -> int:
+    if joint not in JOINTS:
+        raise InputError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
+    return JOINTS.index(joint)
+
+
 def _supplies(boom: Boom, own: Drive | None, voltages: Sequence[float]) -> tuple[Sourced[float] | None, ...]:
     for voltage in voltages:
         if not scalar("voltage", voltage) > 0.0:
@@ -284,7 +292,7 @@ def _view(boom: Boom, cycle: Cycle, joint: str, payload_as: PayloadAs) -> JointV
     motion = cycle.trajectory
     states = (motion.q, motion.qd, motion.qdd)
     tau = inverse_dynamics(boom, *states, payload_as=payload_as, friction=True, reactions=False).tau
-    return joint_views(boom, motion, tau, payload_as=payload_as, duty=cycle.duty)[JOINTS.index(joint)]
+    return joint_views(boom, motion, tau, payload_as=payload_as, duty=cycle.duty)[_index(joint)]
 
 
 def _judged(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, view: JointView) -> Judged:
