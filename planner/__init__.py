@@ -2,17 +2,25 @@
 
 from planner.checks import average_torque
 from planner.constraints import InfeasiblePathError
+from planner.missions import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
 from planner.path import JointLine, Path
 from planner.planning import Move, Profile, check, plan
 from planner.report import Report
 from planner.rows import Row, Verdict
+from planner.sizing import Adapt, Choice, Judged, candidates, choose, size
 from planner.targets import TipTarget, parse_hold, parse_pitch, parse_target
 from planner.time_law import Motion, TimeLaw
 from planner.trajectory import Trajectory, read_csv, sample, write_csv
 
 __all__ = [
+    "Adapt",
+    "Choice",
+    "Cycle",
     "InfeasiblePathError",
     "JointLine",
+    "Judged",
+    "Leg",
+    "Mission",
     "Motion",
     "Move",
     "Path",
@@ -24,12 +32,18 @@ __all__ = [
     "Trajectory",
     "Verdict",
     "average_torque",
+    "candidates",
     "check",
+    "check_cycle",
+    "choose",
+    "load_mission",
     "parse_hold",
     "parse_pitch",
     "parse_target",
     "plan",
+    "plan_cycle",
     "read_csv",
     "sample",
+    "size",
     "write_csv",
 ]

@@ -496,7 +496,7 @@ def size(
     boom_file: str | None,
     as_json: bool,
 ) -> int:
-    """Go through the catalogue for each joint: what passes on a mission, ranked by mass and margin, and why the rest does not.
+    """Go through the catalogue for each joint: what does not fail, ranked by mass and margin, and why the rest does.
 
     \b
     Example:
@@ -594,7 +594,7 @@ def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> i
     return ANSWER_IS_NO if report.verdict is Verdict.FAIL else 0
 
 
-_STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta"}
+_STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta", "INFO": "dim"}
 
 
 def _print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

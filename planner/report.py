@@ -116,14 +116,19 @@ def cells(row: Row) -> tuple[str, ...]:
     return (
         row.joint,
         row.check,
-        "-" if row.demand is None else f"{row.demand * factor:.4g} {unit}".rstrip(),
-        "-" if row.limit is None else f"{row.limit * factor:.4g} {unit}".rstrip(),
+        "-" if row.demand is None else f"{_rounded(row.demand * factor)} {unit}".rstrip(),
+        "-" if row.limit is None else f"{_rounded(row.limit * factor)} {unit}".rstrip(),
         margin,
         "-" if row.verdict is Verdict.INFO else f"{row.required_margin:.0%}",
         "-" if row.at_s is None else f"{row.at_s:.2f} s",
         row.verdict,
         row.basis or "-",
     )
+
+
+def _rounded(value: float) -> str:
+    """Four digits, and no power of ten below a million million."""
+    return f"{float(f'{value:.4g}'):.12g}"
 
 
 PEAK_HEADER = ("joint", "at", "total", "gravity", "inertia", "velocity", "payload", "friction", "vehicle")

@@ -27,7 +27,7 @@ from planner.actuator_checks import actuator_rows
 from planner.checks import drive_rows, joint_views
 from planner.joint_view import JointView
 from planner.missions import Cycle, Mission, plan_cycle
-from planner.rows import Row, Verdict
+from planner.rows import Row, Verdict, overall
 
 POWER_OFF = "power-off hold"
 """The brake's matter, whatever drive it holds: left out of the choice."""
@@ -68,9 +68,13 @@ class Judged:
     """Why no motion was found."""
 
     @property
-    def passes(self) -> bool:
-        """Whether nothing fails; what has no data is not known to pass, and stands in `unknown`."""
-        return self.infeasible is None and all(row.verdict is not Verdict.FAIL for row in self.rows)
+    def verdict(self) -> Verdict:
+        """FAIL also where no motion was found; INCOMPLETE where a check has no data, which is no pass."""
+        return Verdict.FAIL if self.infeasible is not None else overall(self.rows)
+
+    @property
+    def fails(self) -> bool:
+        return self.verdict is Verdict.FAIL
 
     @property
     def first_failing(self) -> Row | None:
@@ -156,7 +160,7 @@ def size(
     adapt: Adapt = Adapt.NOTHING,
     payload_as: PayloadAs = "mass",
 ) -> tuple[Judged, ...]:
-    """Each drive on a joint, the others as they are: what passes first, by mass and then by margin; what fails behind.
+    """Each drive on a joint, the others as they are: what does not fail, by mass and then by margin; what fails behind.
 
     The drives' own mass is in no body here: another one on the base changes no torque of inner and lower, one farther out
     would.
@@ -168,7 +172,7 @@ def size(
             found.append(_replanned(boom, cycle.mission, joint, drive, payload_as))
             continue
         judged = _judged(boom, cycle, joint, drive, view)
-        if adapt is Adapt.RESCALE and not judged.passes:
+        if adapt is Adapt.RESCALE and judged.fails:
             judged = _rescaled(boom, cycle, joint, drive, payload_as)
         found.append(judged)
     return tuple(sorted(found, key=_rank))
@@ -193,8 +197,8 @@ class Choice:
 
     @property
     def lightest(self) -> Judged | None:
-        """The first that passes."""
-        return next((judged for judged in self.judged if judged.passes), None)
+        """The first that does not fail."""
+        return next((judged for judged in self.judged if not judged.fails), None)
 
     @property
     def saves(self) -> float | None:
@@ -313,7 +317,7 @@ def _rescaled(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, 
         return _judged(boom, slower, joint, drive, _view(boom, slower, joint, payload_as))
 
     slowest = slowed(LARGEST_STRETCH)
-    if not slowest.passes:
+    if slowest.fails:
         return slowest
     low, high, best = 1.0, LARGEST_STRETCH, slowest
     for _ in range(_STRETCH_STEPS):
@@ -321,8 +325,8 @@ def _rescaled(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, 
             break
         middle = (low + high) / 2.0
         judged = slowed(middle)
-        low, high = (low, middle) if judged.passes else (middle, high)
-        best = judged if judged.passes else best
+        low, high = (middle, high) if judged.fails else (low, middle)
+        best = best if judged.fails else judged
     return best
 
 
@@ -341,6 +345,6 @@ def room(row: Row) -> float:
 
 
 def _rank(judged: Judged) -> tuple[bool, float, tuple[float, ...]]:
-    """What passes, by mass, then by the least room, then by the next; the shared rows of one gearbox decide nothing."""
+    """What does not fail, by mass, then by the least room, then by the next; the shared rows of one gearbox decide nothing."""
     rooms = tuple(-room(row) for row in judged.by_room)
-    return not judged.passes, np.inf if judged.mass is None else judged.mass, rooms
+    return judged.fails, np.inf if judged.mass is None else judged.mass, rooms

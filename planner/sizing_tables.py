@@ -23,16 +23,16 @@ def ranking(choice: Choice) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     for place, judged in enumerate(choice.judged, start=1):
         mass = "-" if judged.mass is None else f"{judged.mass:.1f} kg"
         parts = ("actuator", "-") if isinstance(judged.drive, LinearDrive) else ("gearbox", "motor")
-        spare = [_margin(judged.tightest(part)) if judged.passes else "-" for part in parts]
+        spare = ["-" if judged.fails else _margin(judged.tightest(part)) for part in parts]
         warned = ", ".join(check for check in judged.warned if check not in choice.warned) or "-"
-        facts = (str(place) if judged.passes else "-", judged.name, judged.supply, mass, *spare, warned)
+        facts = ("-" if judged.fails else str(place), judged.name, judged.supply, mass, *spare, warned)
         cycle = "-" if judged.infeasible else f"{judged.moving:.1f} of {judged.duration:.0f} s"
         rows.append((*facts, *([cycle] if timed else []), outcome(judged)))
     return (*header[:-1], *(["moving"] if timed else []), header[-1]), rows
 
 
 def outcome(judged: Judged) -> str:
-    """Whether a drive passes, or the first thing that fails; a check without data is no pass."""
+    """The verdict of a drive, or the first thing that fails; a check without data is no pass."""
     if judged.infeasible is not None:
         return f"FAIL: {judged.infeasible}"
     failing = judged.first_failing
@@ -106,7 +106,7 @@ def _judged_json(judged: Judged) -> dict[str, Any]:
         "drive": judged.name,
         "supply": judged.supply,
         "mass_kg": judged.mass,
-        "passes": judged.passes,
+        "verdict": judged.verdict,
         "cycle_s": None if judged.infeasible else judged.duration,
         "moving_s": None if judged.infeasible else judged.moving,
         "infeasible": judged.infeasible,
@@ -159,6 +159,6 @@ def _margin(row: Row | None) -> str:
 def _short(judged: Judged | None) -> str:
     if judged is None:
         return "-"
-    if judged.passes:
-        return f"passes; {_margin(judged.tightest('motor') or judged.tightest())}"
+    if not judged.fails:
+        return f"no FAIL; {_margin(judged.tightest('motor') or judged.tightest())}"
     return "FAIL: no motion" if judged.first_failing is None else f"FAIL: {_margin(judged.first_failing)}"

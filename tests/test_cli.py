@@ -231,6 +231,8 @@ def test_missions_stand_side_by_side(boom):
     assert (code, "a page shows one mission" in err) == (2, True)
     code, _, err = boom("mission", "table-2-4", "table-2-4")
     assert (code, "two missions bear one name" in err) == (2, True)
+    code, _, err = boom("mission", "table-2-4", "--joint", "elbow")
+    assert (code, "unknown joint 'elbow'; there are: yaw" in err) == (2, True)
     assert boom("mission", "field-day", "--payload", "30")[0] == 1  # its gearboxes fail
 
 
