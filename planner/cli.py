@@ -152,6 +152,7 @@ def plan(
 
     boom = _load(boom_file, payload)
     case = None if vehicle is None else load_case(vehicle)
+    _check_picture(picture)
     check_writable(out, csv_file, picture)
     try:
         move = plan_move(
@@ -383,6 +384,7 @@ def check(
 
     boom, trajectory = _load(boom_file, payload), read_csv(motion)
     case = None if vehicle is None else load_case(vehicle)
+    _check_picture(picture)
     check_writable(picture)
     report, written = check_motion(boom, trajectory, payload_as=payload_as, vehicle=case), {}
     if picture is not None:
@@ -431,6 +433,7 @@ def mission(
     from planner.vehicle import load_case
 
     boom, case = _load(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    _check_picture(picture)
     check_writable(out, picture)
     if picture is not None and len(missions) > 1:
         raise InputError(f"--picture {picture}: a page shows one mission, and {len(missions)} are given")
@@ -565,6 +568,11 @@ def view(recording: str) -> int:
 def _load(boom_file: str | None, payload: float | None = None) -> Boom:
     boom = Boom.load(boom_file, click.get_current_context().meta.get(_CATALOGUE))
     return boom if payload is None else boom.with_payload(payload)
+
+
+def _check_picture(picture: str | None) -> None:
+    if picture is not None and not picture.endswith(".png"):
+        raise InputError(f"{picture}: the drives' page is written as .png")
 
 
 def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:

@@ -15,7 +15,7 @@ class Duty:
     weight: Array
     """(n,) how long each sample lasts in the whole cycle [s]: integral f dt = sum weight f."""
     powered: Mask
-    """(n,) whether the motors are on; False in a pause, which brakes hold where there are any."""
+    """(n,) whether the motors are on; False in a pause, where only a motor without a brake stays on."""
     required_life: Sourced[float] | None = None
     """What the gearboxes are to live, pauses included [s]."""
     tip_tolerance: Sourced[float] | None = None

@@ -1,7 +1,7 @@
 """A duty cycle of several moves, holds and pauses, from a TOML file to the samples and times that the checks look at.
 
-A **hold** stands with the motors on; in a **pause** brakes hold where there are any, and the motors are off. Moves come back
-in a cycle, so each different one is planned and sampled once and carries how often it is made.
+A **hold** stands with the motors on; in a **pause** the brakes hold, and a motor is off where its joint has one. Moves come
+back in a cycle, so each different one is planned and sampled once and carries how often it is made.
 """
 
 from collections.abc import Iterator

@@ -54,7 +54,8 @@ def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     if other:
         yield _other_reading_row(view, drive, np.max(other, axis=0))
     yield _motor_speed_row(view, drive, np.max(demands, axis=0))
-    driven = np.where(view.duty.powered, demands[0], 0.0)
+    braked = drive.brake is not None and drive.brake.value  # without one the motor holds in a pause too
+    driven = np.where(view.duty.powered, demands[0], 0.0) if braked else demands[0]
     known = Origin(Basis.PRINTED, f"{drive.motor.source}; a stepper's heat goes with its current, not with its torque")
     yield view.told("motor RMS torque", view.duty.mean(driven**2) ** 0.5, "Nm", None, known)
 

@@ -31,12 +31,12 @@ def tip_rows(boom: Boom, trajectory: Trajectory, tau: Array, duty: Duty, M: Arra
     vector = budget.wind_up
     for check, size in (
         ("wind-up", np.linalg.norm(vector, axis=-1)),
-        ("wind-up, upwards", vector[:, 2]),
+        ("sag by wind-up", np.maximum(-vector[:, 2], 0.0)),
         ("backlash", budget.backlash),
         ("hysteresis", budget.hysteresis),
         ("step error", budget.step),
     ):
-        at = int(np.argmax(np.abs(size)))
+        at = int(np.argmax(size))
         yield told("tip", check, float(size[at]), "m", float(trajectory.t[at]), origin)
     at = int(np.argmax(budget.total))
     yield _total_row(float(budget.total[at]), float(trajectory.t[at]), duty, origin, bool(budget.uncounted))

@@ -265,6 +265,8 @@ def test_a_catalogue_of_ones_own_adds_to_the_choice(boom, tmp_path):
 def test_plan_and_check_draw_the_drives(boom, tmp_path):
     boom("plan", "transport", "phenotyping", "--csv", "move.csv", "--picture", "plan.png")
     boom("check", "move.csv", "--picture", "check.png")
+    code, _, err = boom("check", "move.csv", "--picture", "check.pdf")
+    assert (code, "check.pdf: the drives' page is written as .png" in err) == (2, True)
     for name in ("plan.png", "check.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 

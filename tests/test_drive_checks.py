@@ -102,6 +102,14 @@ def test_average_speed_life_and_rms_count_pauses_and_average_torque_does_not():
     assert row(all_of_it, "gearbox life").limit == pytest.approx(4.0 * row(one, "gearbox life").limit, rel=1e-8)
 
 
+def test_without_a_brake_a_pause_is_a_hold():
+    t = np.array([0.0, 1.0])
+    paused = Duty(Duty.alone(t).weight, np.array([False, False]))
+    for brake, rms in ((DRIVE.brake, 0.0), (None, 0.5), (Sourced(False, MINE), 0.5)):
+        rows = motor_rows(view(tau=-80.0, duty=paused), replace(DRIVE, brake=brake))
+        assert row(rows, "motor RMS torque").demand == pytest.approx(rms, rel=1e-12)
+
+
 def test_rms_of_a_held_torque_is_its_share():
     """-80 Nm at 1 rad/s is braked: 80 / 160 = 0.5 Nm."""
     assert row(motor_rows(view(tau=-80.0, qd=1.0), DRIVE), "motor RMS torque").demand == pytest.approx(0.5, rel=1e-12)
@@ -245,6 +253,15 @@ def test_a_warning_on_the_curve_is_not_hidden_by_a_sample_off_it():
     found = row(motor_rows(view(tau=joint, qd=[slow, fast]), DRIVE), "motor torque")
     assert found.verdict is Verdict.WARN
     assert found.margin == pytest.approx(0.60, abs=1e-9)
+
+
+def test_90_degrees_in_2_seconds():
+    """45 deg/s on average are 160 x 45 / 6 = 1200 rpm, a cubic's peak is half as much again; 1000 rpm are 37.5 deg/s."""
+    t = np.linspace(0.0, 2.0, 2001)
+    rows = list(gearbox_rows(view(tau=50.0, qd=np.radians(90.0) * (6 * t / 4 - 6 * t**2 / 8), t=t), DRIVE, None))
+    assert row(rows, "gearbox average input speed").demand / RPM == pytest.approx(1200.0, rel=1e-6)
+    assert row(rows, "gearbox input speed").demand / RPM == pytest.approx(1800.0, rel=1e-12)
+    assert np.radians(37.5) * 160 / RPM == pytest.approx(1000.0, rel=1e-12)
 
 
 # What holds of all of them
