@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.drives import Drive
 from boom_model.errors import InputError
+from boom_model.keep_out import KeepOut
 from boom_model.linear_actuator import LinearDrive
 from boom_model.provenance import Origin, Sourced
 
@@ -152,6 +153,8 @@ class Boom:
     """[m/s^2]"""
     actuator: LinearDrive | None = None
     """Linear actuator of the extension; None where none is given, as for drives."""
+    keep_out: KeepOut | None = None
+    """What the arm must keep away from; None where nobody says."""
 
     @staticmethod
     def load(path: str | Path | None = None, catalogue: str | Path | None = None) -> "Boom":

@@ -14,6 +14,7 @@ from boom_model.boom import JOINTS, MOVING_BODIES, Body, Boom, Friction, Geometr
 from boom_model.catalogue import CATALOGUE_FILE, Catalogue
 from boom_model.drives import Drive, Wiring
 from boom_model.errors import InputError
+from boom_model.keep_out import Box, Capsule, KeepOut
 from boom_model.linear_actuator import LinearDrive
 from boom_model.provenance import Basis, Origin, Sourced
 from boom_model.toml_file import Finite, NonNegative, Positive, Table, read_toml
@@ -175,6 +176,37 @@ class _MountTable(Table):
     moment_Nm: _Sourced[Positive] | None = None
 
 
+class _BoxTable(_Origin):
+    name: str
+    center_m: Triple
+    size_m: Annotated[list[Positive], Field(min_length=3, max_length=3)]
+
+
+class _CapsuleTable(_Origin):
+    name: str
+    start_m: Triple
+    end_m: Triple
+    radius_m: Positive
+
+
+class _KeepOutTable(_Origin):
+    clearance_m: NonNegative
+    link_radius_m: NonNegative
+    payload_radius_m: NonNegative
+    box: list[_BoxTable] = Field(default_factory=list)
+    capsule: list[_CapsuleTable] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _named_once(self) -> "_KeepOutTable":
+        names = [*(box.name for box in self.box), *(capsule.name for capsule in self.capsule)]
+        twice = {name for name in names if names.count(name) > 1}
+        if twice:
+            raise ValueError(f"two shapes are named {', '.join(sorted(twice))}")
+        if not names:
+            raise ValueError("no box and no capsule is given")
+        return self
+
+
 class _PayloadTable(_Origin):
     mass_kg: NonNegative
     com_m: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
@@ -199,6 +231,7 @@ class _BoomTable(Table):
     linkage: _LinkageTable
     mount: _MountTable = Field(default_factory=_MountTable)
     poses: dict[str, _PoseTable] = Field(default_factory=dict)
+    keep_out: _KeepOutTable | None = None
 
 
 def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
@@ -223,11 +256,18 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
         ),
         actuator=_linear_drive(file, table.joints.extension.actuator, known, catalogue),
         poses=MappingProxyType({name: _pose(pose) for name, pose in table.poses.items()}),
+        keep_out=None if table.keep_out is None else _keep_out(table.keep_out),
     )
 
 
 def _body(table: _BodyTable | _PayloadTable) -> Body:
     return Body(table.mass_kg, read_only(table.com_m), table.inertia_kg_m2)
+
+
+def _keep_out(table: _KeepOutTable) -> KeepOut:
+    boxes = [Box(b.name, read_only(b.center_m), read_only(b.size_m), b.origin) for b in table.box]
+    capsules = [Capsule(c.name, read_only(c.start_m), read_only(c.end_m), c.radius_m, c.origin) for c in table.capsule]
+    return KeepOut((*boxes, *capsules), table.clearance_m, table.link_radius_m, table.payload_radius_m, table.origin)
 
 
 def _given(table: "_Sourced[V] | None") -> Sourced[V] | None:

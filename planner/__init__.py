@@ -1,19 +1,23 @@
 """From targets to motions that have been checked, and to what people keep of them: reports, recordings, CSV."""
 
+from planner.certificate import Certificate, WorstRatio, certify
 from planner.checks import average_torque
 from planner.constraints import InfeasiblePathError
 from planner.missions import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
 from planner.path import JointLine, Path
-from planner.planning import Move, Profile, check, plan
+from planner.planning import Move, check, plan
 from planner.report import Report
 from planner.rows import Row, Verdict
 from planner.sizing import Adapt, Choice, Judged, candidates, choose, size
+from planner.stopping import Stop, WorstStop, stop
 from planner.targets import TipTarget, parse_hold, parse_pitch, parse_target
 from planner.time_law import Motion, TimeLaw
+from planner.timing import Profile
 from planner.trajectory import Trajectory, read_csv, sample, write_csv
 
 __all__ = [
     "Adapt",
+    "Certificate",
     "Choice",
     "Cycle",
     "InfeasiblePathError",
@@ -27,12 +31,16 @@ __all__ = [
     "Profile",
     "Report",
     "Row",
+    "Stop",
     "TimeLaw",
     "TipTarget",
     "Trajectory",
     "Verdict",
+    "WorstRatio",
+    "WorstStop",
     "average_torque",
     "candidates",
+    "certify",
     "check",
     "check_cycle",
     "choose",
@@ -45,5 +53,6 @@ __all__ = [
     "read_csv",
     "sample",
     "size",
+    "stop",
     "write_csv",
 ]

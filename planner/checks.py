@@ -9,6 +9,7 @@ from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, LIMIT_TOLERANCE
 from boom_model.dynamics import PayloadAs
 from planner.actuator_checks import actuator_rows
+from planner.clearance import nearest_approach
 from planner.duty import Duty
 from planner.gearbox_checks import gearbox_rows
 from planner.joint_view import JointView, Shock
@@ -62,6 +63,7 @@ def check_rows(
         else:
             rows += _undriven_rows(view)
     rows += _mount_rows(boom, trajectory.t, loads)
+    rows += _clearance_rows(boom, trajectory)
     rows += tip_rows(boom, trajectory, loads.tau, duty, M, Basis.weakest(view.basis for view in views))
     return tuple(rows)
 
@@ -149,6 +151,18 @@ def _room(joint: str, check: str, demand: float, limit: float, room: float, unit
     verdict = Verdict.PASS if room >= -LIMIT_TOLERANCE else Verdict.FAIL
     room = 0.0 if abs(room) <= LIMIT_TOLERANCE else float(room)
     return Row(joint, check, float(demand), float(limit), unit, room, 0.0, float(at), verdict, origin.basis, origin.source)
+
+
+def _clearance_rows(boom: Boom, trajectory: Trajectory) -> Iterator[Row]:
+    """The arm's nearest approach to what it must keep away from, as the mount carries it."""
+    keep = boom.keep_out
+    if keep is None:
+        return
+    at, found = nearest_approach(boom, trajectory.q)
+    origins = [keep.origin, *(shape.origin for shape in keep.shapes if shape.name == found.shape)]
+    origin = Origin(Basis.weakest([each.basis for each in origins]), "; ".join(each.source for each in origins))
+    check, room = f"clearance of {found.link} to {found.shape}", found.distance - keep.clearance
+    yield _room("arm", check, found.distance, keep.clearance, room, "m", float(trajectory.t[at]), origin)
 
 
 def _rate_rows(boom: Boom, trajectory: Trajectory, i: int) -> Iterator[Row]:

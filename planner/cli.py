@@ -1,22 +1,27 @@
 """The command `boom`: parsing and printing, nothing else. What is slow to import is imported by the command that needs it."""
 
+import io
 import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import redirect_stdout
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from boom_model import Boom, BoomError, InfeasibleError, InputError, inverse_kinematics
-from planner.targets import HOLDS, parse_along, parse_hold, parse_pitch, parse_target, unreachable
+from planner.targets import HOLDS, parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target, unreachable
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from boom_model.arrays import Array
     from planner.report import Report
+    from planner.trajectory import Trajectory
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _PIPE_WIDTH = 132
@@ -43,6 +48,9 @@ payload_as_option = click.option(
     help="Accelerate the payload with the tip, or hang its weight there and leave out its inertia, as the thesis does.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
+report_option = click.option(
+    "--report", "document", metavar="FILE.md|.html|.pdf", help="The report as a document, with pictures, versions and command."
+)
 vehicle_option = click.option(
     "--vehicle",
     metavar="CASE",
@@ -99,20 +107,29 @@ def cli() -> None:
 @click.argument("start")
 @click.argument("goal")
 @click.option(
-    "--profile", type=click.Choice(["cubic", "time-optimal", "jerk-limited"]), default="cubic", show_default=True,
-    help="How the path is timed.",
+    "--profile", type=click.Choice(["cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal"]), default="cubic",
+    show_default=True, help="How the path is timed.",
 )  # fmt: skip
 @click.option("--via", multiple=True, metavar="TARGET", help="A target on the way, with a stop; may be given again.")
+@click.option("--pass-via", is_flag=True, help="Go through the targets on the way on a smooth path, without a stop.")
+@click.option(
+    "--via-velocity", multiple=True, metavar="DEG/S,DEG/S,DEG/S,M/S,DEG/S",
+    help="The cubic's velocity at each --via, in turn, without a stop; else its acceleration is continuous there.",
+)  # fmt: skip
 @click.option(
     "--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z",
     help="What goes straight: the joints, or the tip from tip target to tip target; or an arc of the tip through a point.",
 )  # fmt: skip
 @click.option("--duration", type=float, metavar="S", help="Else the least that the limits allow.")
+@click.option("--jerk-bound", is_flag=True, help="Hold the time-optimal profile to the jerk limits as well.")
+@click.option("--average-torque", is_flag=True, help="Hold the time-optimal profile to the gearboxes' average torque as well.")
+@click.option("--rate", type=float, metavar="HZ", help="Sample at a controller's rate; the move ends on its clock.")
 @pitch_option
 @hold_option
 @payload_option
 @click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
 @click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
+@report_option
 @picture_option
 @vehicle_option
 @boom_option
@@ -122,14 +139,20 @@ def plan(
     goal: str,
     profile: str,
     via: tuple[str, ...],
+    pass_via: bool,
+    via_velocity: tuple[str, ...],
     along: str,
     duration: float | None,
+    jerk_bound: bool,
+    average_torque: bool,
+    rate: float | None,
     pitch: str,
     hold: str,
     payload: float | None,
     out: str,
     csv_file: str | None,
     picture: str | None,
+    document: str | None,
     vehicle: str | None,
     boom_file: str | None,
     as_json: bool,
@@ -144,9 +167,11 @@ def plan(
       boom plan transport phenotyping
       boom plan transport tip=1.4,0,1.0 --hold extension=0.25 --profile time-optimal
       boom plan tip=1,1.7,0.9 tip=-1,1.7,0.9 --along line --profile jerk-limited
+      boom plan transport phenotyping --via q=40,60,120,0.3,0 --pass-via --profile time-optimal --jerk-bound --rate 250
     """
     from planner.files import check_writable
     from planner.planning import plan as plan_move
+    from planner.remedies import remedies
     from planner.trajectory import write_csv
     from planner.vehicle import load_case
 
@@ -154,32 +179,35 @@ def plan(
     case = None if vehicle is None else load_case(vehicle)
     _check_picture(picture)
     check_writable(out, csv_file, picture)
+    _require_document(document)
+    targets = parse_target(start), parse_target(goal)
+    options: dict[str, Any] = {
+        "profile": profile,
+        "duration": duration,
+        "pitch": parse_pitch(pitch),
+        "hold": parse_hold(hold),
+        "via": [parse_target(text) for text in via],
+        "stop_at_via": not pass_via,
+        "via_velocities": [parse_joint_velocity(text) for text in via_velocity] or None,
+        "along": parse_along(along),
+        "jerk_bound": jerk_bound,
+        "average_torque": average_torque,
+        "vehicle": case,
+        "rate": rate,
+    }
     try:
-        move = plan_move(
-            boom,
-            parse_target(start),
-            parse_target(goal),
-            profile=profile,
-            duration=duration,
-            pitch=parse_pitch(pitch),
-            hold=parse_hold(hold),
-            via=[parse_target(text) for text in via],
-            along=parse_along(along),
-            vehicle=case,
-        )
+        move = plan_move(boom, *targets, **options)
     except InfeasibleError as error:
+        mend = [remedy.sentence for remedy in remedies(boom, *targets, _tracked("looking for what would mend it"), **options)]
         if as_json:
-            _print_json(
-                {
-                    "profile": profile,
-                    "duration_s": None,
-                    "verdict": "FAIL",
-                    "checks": [],
-                    "files": {},
-                    "reason": str(error),
-                }
-            )
+            failed: dict[str, Any] = {"profile": profile, "duration_s": None, "verdict": "FAIL", "checks": [], "files": {}}
+            _print_json({**failed, "reason": str(error), "remedies": mend})
+        _print_lines("Would mend it" if not as_json else None, mend)
         raise
+    report = move.report
+    if report.verdict == "FAIL":
+        found = remedies(boom, *targets, _tracked("looking for what would mend it"), **options)
+        report = replace(report, remedies=tuple(remedy.sentence for remedy in found))
     from planner.recording import write_recording
 
     written = {"recording": out}
@@ -190,9 +218,58 @@ def plan(
     if picture is not None:
         from planner.drive_pictures import write_drive_picture
 
-        write_drive_picture(picture, boom, move.trajectory, move.loads.tau, move.report)
+        write_drive_picture(picture, boom, move.trajectory, move.loads.tau, report)
         written["picture"] = picture
-    return _print_report(move.report, written, as_json)
+    _write_document(document, report, boom, move.trajectory, move.loads.tau, written)
+    return _print_report(report, written, as_json)
+
+
+@cli.command(context_settings={"ignore_unknown_options": True})
+@click.argument("start")
+@click.argument("goal")
+@click.option("--via", multiple=True, metavar="TARGET", help="A target on the way, with a stop; may be given again.")
+@click.option("--pass-via", is_flag=True, help="Go through the targets on the way on a smooth path, without a stop.")
+@pitch_option
+@hold_option
+@payload_option
+@boom_option
+@json_option
+def profiles(
+    start: str,
+    goal: str,
+    via: tuple[str, ...],
+    pass_via: bool,
+    pitch: str,
+    hold: str,
+    payload: float | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Every profile on one move, side by side: duration, worst ratio to each limit, worst stop.
+
+    \b
+    Example:
+      boom profiles transport phenotyping --payload 20
+    """
+    from planner.profile_table import HEADER, cells, profile_table
+
+    rows = profile_table(
+        _load(boom_file, payload),
+        parse_target(start),
+        parse_target(goal),
+        via=[parse_target(text) for text in via],
+        stop_at_via=not pass_via,
+        pitch=parse_pitch(pitch),
+        hold=parse_hold(hold),
+    )
+    if as_json:
+        _print_json({"profiles": [asdict(row) for row in rows]})
+    else:
+        table = _table(*HEADER)
+        for row in rows:
+            table.add_row(*cells(row))
+        _console().print(table)
+    return ANSWER_IS_NO if any(row.verdict == "FAIL" for row in rows) else 0
 
 
 @cli.command(context_settings={"ignore_unknown_options": True})
@@ -357,6 +434,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 @payload_option
 @payload_as_option
 @vehicle_option
+@report_option
 @picture_option
 @boom_option
 @json_option
@@ -366,6 +444,7 @@ def check(
     payload_as: Any,
     vehicle: str | None,
     picture: str | None,
+    document: str | None,
     boom_file: str | None,
     as_json: bool,
 ) -> int:
@@ -382,16 +461,21 @@ def check(
     from planner.trajectory import read_csv
     from planner.vehicle import load_case
 
+    _require_document(document)
     boom, trajectory = _load(boom_file, payload), read_csv(motion)
     case = None if vehicle is None else load_case(vehicle)
     _check_picture(picture)
     check_writable(picture)
-    report, written = check_motion(boom, trajectory, payload_as=payload_as, vehicle=case), {}
-    if picture is not None:
-        from planner.drive_pictures import write_drive_picture
+    report = check_motion(boom, trajectory, payload_as=payload_as, vehicle=case)
+    written: dict[str, str] = {}
+    if picture is not None or document is not None:
+        tau = torques(boom, trajectory, payload_as, case)
+        _write_document(document, report, boom, trajectory, tau, written)
+        if picture is not None:
+            from planner.drive_pictures import write_drive_picture
 
-        write_drive_picture(picture, boom, trajectory, torques(boom, trajectory, payload_as, case), report)
-        written["picture"] = picture
+            write_drive_picture(picture, boom, trajectory, tau, report)
+            written["picture"] = picture
     return _print_report(report, written, as_json)
 
 
@@ -577,7 +661,7 @@ def _check_picture(picture: str | None) -> None:
 
 def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:
     from planner.checks import Verdict
-    from planner.report import PEAK_HEADER, cells, peak_cells
+    from planner.report import CERTIFICATE_HEADER, PEAK_HEADER, cells, peak_cells, worst_cells
 
     if as_json:
         _print_json(report.to_json(written))
@@ -593,8 +677,17 @@ def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> i
         for peak in report.peaks:
             peaks.add_row(*peak_cells(peak))
         console.print(peaks)
+        if report.certificate is not None:
+            worst = _table(*CERTIFICATE_HEADER)
+            for ratio in report.certificate.worst:
+                worst.add_row(*worst_cells(ratio))
+            console.print("Worst ratio to each limit", highlight=False)
+            console.print(worst)
+        for sentence in report.sentences:
+            click.echo(sentence)
         _print_lines("Note", report.notes)
         _print_lines("Assumed", report.assumptions)
+        _print_lines("Would mend it", report.remedies)
         console.print(f"{report.profile}, {report.duration:.3f} s", highlight=False)
         console.print(report.summary, style=_STYLES.get(report.verdict), highlight=False, soft_wrap=True)
         for kind, name in written.items():
@@ -612,17 +705,67 @@ def _print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     _console().print(table)
 
 
-def _print_lines(title: str, lines: tuple[str, ...]) -> None:
-    for line in lines:
+def _require_document(path: str | None) -> None:
+    from planner.document import require_form
+    from planner.files import check_writable
+
+    if path is not None:
+        require_form(path)
+        check_writable(path)
+
+
+def _write_document(
+    path: str | None, report: "Report", boom: Boom, motion: "Trajectory", tau: "Array", written: dict[str, str]
+) -> None:
+    from planner.document import write_document
+    from planner.drive_pictures import drive_figure
+    from planner.move_pictures import move_pictures
+
+    if path is not None:
+        drives = {"Drives": drive_figure(boom, motion, tau, report)} if any(boom.drives) else {}
+        write_document(path, report.to_markdown(), move_pictures(boom, motion, tau) | drives)
+        written["report"] = path
+
+
+def _print_lines(title: str | None, lines: Iterable[str]) -> None:
+    for line in () if title is None else lines:
         click.echo(f"{title}: {line}")
 
 
 def _print_json(answer: dict[str, Any]) -> None:
-    click.echo(json.dumps(answer, allow_nan=False, indent=2))
+    out = click.get_current_context().meta.get(_LOUD, sys.stdout)
+    click.echo(json.dumps(answer, allow_nan=False, indent=2), file=out)
 
 
 def _complain(message: str) -> None:
     click.echo(f"boom: {' '.join(message.split())}", err=True)
+
+
+def _tracked(title: str) -> Callable[[list[Any]], Iterable[Any]]:
+    """Iteration with a progress bar on standard error, where that is a terminal."""
+
+    def track(steps: list[Any]) -> Iterable[Any]:
+        from rich.console import Console
+        from rich.progress import track as bar
+
+        return bar(steps, title, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty() or _is_quiet())
+
+    return track
+
+
+_LOUD = "boom.stdout"
+
+
+def _is_quiet() -> bool:
+    return _LOUD in click.get_current_context().meta
+
+
+def _quieten(ctx: click.Context, _: click.Parameter, quiet: bool) -> None:
+    """Standard output goes nowhere until the command ends; JSON, which was asked for, still goes out."""
+    if not quiet or _LOUD in ctx.meta:
+        return
+    ctx.meta[_LOUD], nowhere = sys.stdout, io.StringIO()
+    ctx.with_resource(redirect_stdout(nowhere))
 
 
 def _console() -> "Console":
@@ -637,3 +780,9 @@ def _table(*columns: str) -> "Table":
     from rich.table import Table
 
     return Table(*columns, box=SIMPLE, pad_edge=False)
+
+
+for _command in cli.commands.values():
+    _command.params.append(
+        click.Option(["-q", "--quiet"], is_flag=True, expose_value=False, callback=_quieten, help="Print errors alone.")
+    )

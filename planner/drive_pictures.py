@@ -17,6 +17,7 @@ from planner.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
 COLORS = {  # Okabe and Ito's, which the colour-blind can tell apart
@@ -43,7 +44,18 @@ def write_drive_picture(
 
 
 def drive_picture(boom: Boom, trajectory: Trajectory, tau: Array, report: Report, parts: Sequence[slice] = ()) -> bytes:
-    """A PNG with a row of three panels for each joint that has a motor.
+    """`drive_figure` as a PNG.
+
+    Raises:
+        InputError: no joint has a motor.
+    """
+    picture = BytesIO()
+    drive_figure(boom, trajectory, tau, report, parts).savefig(picture, format="png")
+    return picture.getvalue()
+
+
+def drive_figure(boom: Boom, trajectory: Trajectory, tau: Array, report: Report, parts: Sequence[slice] = ()) -> "Figure":
+    """A figure with a row of three panels for each joint that has a motor.
 
     Left the motor's torque-speed plane with the motion in it, there and, where it can be run so, back; in the middle the
     gearbox's torque over time beside its ratings; right the margins of the joint's checks. Below, the tip's error budget.
@@ -79,9 +91,7 @@ def drive_picture(boom: Boom, trajectory: Trajectory, tau: Array, report: Report
     _tip(figure.add_subplot(grid[-1, :]), boom, trajectory, tau, shown)
     title = f"{boom.name}, payload {boom.payload.mass:g} kg: {report.profile}, {report.duration:.3f} s: {report.verdict}"
     figure.suptitle(title, y=1.0 - 0.15 / high, va="top")
-    picture = BytesIO()
-    figure.savefig(picture, format="png")
-    return picture.getvalue()
+    return figure
 
 
 def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: Array, rows: Sequence[Row]) -> None:

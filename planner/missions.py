@@ -35,8 +35,11 @@ _DOWN, _HORIZONTAL = "down", "horizontal"
 class _Step(Table):
     to: str | None = None
     via: list[str] = Field(default_factory=list)
+    pass_via: bool = False
     along: str = "joint"
     profile: str = "cubic"
+    jerk_bound: bool = False
+    average_torque: bool = False
     duration_s: Positive | None = None
     pitch: str = _DOWN
     hold: str = _HORIZONTAL
@@ -51,7 +54,7 @@ class _Step(Table):
         if len(given) != 1:
             raise ValueError(f"a step has one of to, hold_s, pause_s and repeat; this one has {', '.join(given) or 'none'}")
         allowed = {
-            "to": {"to", "via", "along", "profile", "duration_s", "pitch", "hold"},
+            "to": {"to", "via", "pass_via", "along", "profile", "jerk_bound", "average_torque", "duration_s", "pitch", "hold"},
             "repeat": {"repeat", "steps"},
         }.get(given[0], {given[0]})
         stray = sorted(self.model_fields_set - allowed)
@@ -301,7 +304,10 @@ def _move(
         pitch=parse_pitch(part.pitch),
         hold=parse_hold(part.hold),
         via=[parse_target(text) for text in part.via],
+        stop_at_via=not part.pass_via,
         along=along,
+        jerk_bound=part.jerk_bound,
+        average_torque=part.average_torque,
         vehicle=vehicle,
         reference=q,
         step=step,

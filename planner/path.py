@@ -1,4 +1,4 @@
-"""Paths parametrised by s from 0 to 1: straight in joint space, or along a line or an arc of the tip."""
+"""Paths parametrised by s from 0 to 1: straight in joint space, through waypoints, or along a line or an arc of the tip."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
@@ -11,7 +11,7 @@ from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from planner.targets import unreachable
 
 if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
+    from scipy.interpolate import BSpline, PPoly
 
 TIP_TOLERANCE = 1e-5
 """How far [m] a spline may leave its line; a tenth of what a sweep is asked to keep."""
@@ -19,6 +19,7 @@ TIP_TOLERANCE = 1e-5
 _NODES = (64, 128, 256, 512, 1024, 2048)
 _CHECKS_PER_NODE = 8
 _BISECTIONS = 50
+_LOOKS = 4001
 _INSET = 1e-4 * np.array([0.0, 1.0, 1.0, 1.0, 1.0])  # [rad or m]; a target leaves no choice of yaw
 _FLIP = 0.25
 """A step between neighbouring nodes of more than this, as a share of a joint's range, is a flip to another branch."""
@@ -134,6 +135,68 @@ class TipPath:
         """What a report says of it."""
         kind = "line" if isinstance(self.curve, TipLine) else "arc"
         return f"the tip follows a {kind} of {self.curve.length:.4g} m to within {self.deviation * 1e3:.3g} mm"
+
+
+@dataclass(frozen=True, eq=False)
+class SplinePath:
+    """Joint path through waypoints without a stop, twice continuously differentiable unless said otherwise."""
+
+    spline: "PPoly"
+    waypoints: Array
+    """(n, 5), start and goal included"""
+
+    def __call__(self, s: ArrayLike, order: int = 0) -> Array:
+        return np.asarray(self.spline(np.clip(s, 0.0, 1.0), order))
+
+    @property
+    def sentence(self) -> str:
+        """What a report says of it."""
+        return f"through {len(self.waypoints) - 2} waypoint(s) without a stop, by a spline"
+
+
+def through(boom: Boom, waypoints: Array) -> SplinePath:
+    """The joint path through waypoints (n, 5) in turn, without corners.
+
+    A natural cubic spline whose parameter between two waypoints is in proportion to the time that the joints' top speeds need
+    there. Where it would overshoot a position limit, a quintic one with monotone (PCHIP) slopes and no curvature at the
+    waypoints, which turns back at a joint's extremes and not beyond them.
+
+    Raises:
+        InfeasibleError: both leave the position limits; names the joint, the place and the excess.
+    """
+    from scipy.interpolate import BPoly, CubicSpline, PchipInterpolator, PPoly
+
+    knots = spaced(boom, waypoints)
+    smooth = SplinePath(CubicSpline(knots, waypoints, bc_type="natural"), waypoints)
+    if overshoot(boom, smooth) is None:
+        return smooth
+    slopes = PchipInterpolator(knots, waypoints)(knots, 1)
+    given = np.stack([waypoints, slopes, np.zeros_like(slopes)], axis=1)
+    tight = SplinePath(PPoly.from_bernstein_basis(BPoly.from_derivatives(knots, given)), waypoints)
+    beyond = overshoot(boom, tight)
+    if beyond is None:
+        return tight
+    raise InfeasibleError(
+        f"no smooth path through the waypoints stays within the limits: {beyond}; stop at one of them instead"
+    )
+
+
+def spaced(boom: Boom, waypoints: Array) -> Array:
+    """Knots (n,) from 0 to 1, spaced as the joints' top speeds need between waypoints (n, 5)."""
+    needed = (np.abs(np.diff(waypoints, axis=0)) / boom.limits.velocity).max(axis=-1)
+    knots: Array = np.append(0.0, np.cumsum(needed)) / needed.sum()
+    knots[-1] = 1.0
+    return knots
+
+
+def overshoot(boom: Boom, path: Path) -> str | None:
+    """Where a path is farthest outside the position limits, in a sentence; None where it stays within them."""
+    s = np.linspace(0.0, 1.0, _LOOKS)
+    q = path(s)
+    excess = boom.limits.excess(q).max(axis=-1)
+    at = int(np.argmax(excess))
+    reasons = boom.limits.reasons(q[at])
+    return f"at {s[at]:.1%}, {'; '.join(reasons)}" if reasons else None
 
 
 def follow(

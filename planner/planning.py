@@ -2,9 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
-from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +11,6 @@ from boom_model import (
     BaseMotion,
     Boom,
     Breakdown,
-    InfeasibleError,
     InputError,
     Loads,
     breakdown,
@@ -24,14 +20,16 @@ from boom_model import (
 from boom_model.arrays import Array, checked
 from boom_model.dynamics import PayloadAs
 from boom_model.holds import Hold
+from planner.certificate import certify
 from planner.checks import check_rows
-from planner.constraints import least_stretch
 from planner.duty import Duty
 from planner.joint_view import Shock
-from planner.path import JointLine, Path, TipArc, TipLine, TipPath, follow
+from planner.legs import Along, legs
 from planner.report import Report, assumptions, torque_peaks
-from planner.targets import Target, TipTarget, resolve
-from planner.time_law import Motion, TimeLaw
+from planner.stopping import worst_stop
+from planner.targets import Target, resolve
+from planner.time_law import Motion
+from planner.timing import Profile, Timing, timed
 from planner.trajectory import STEP, Trajectory, at_rest, check_size, joined, sample
 from planner.vehicle import VehicleCase, base_motion
 
@@ -40,21 +38,6 @@ CHECKS_PER_STEP = 10
 
 SHOCK_SAMPLES = 20
 """Samples that a shock must have for its peak to be seen, to 0.3 %."""
-
-_ROUNDING = 1e-9
-_CURVED_SAMPLES = 40_001
-
-
-Along = Literal["joint", "line"] | ArrayLike
-"""What leads a move: the joints, or the tip on a line or on an arc through a point."""
-
-
-class Profile(StrEnum):
-    """How a path is timed."""
-
-    CUBIC = "cubic"
-    TIME_OPTIMAL = "time-optimal"
-    JERK_LIMITED = "jerk-limited"
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,88 +66,62 @@ def plan(
     pitch: float | None = -np.pi / 2.0,
     hold: Hold | None = None,
     via: Sequence[Target] = (),
+    stop_at_via: bool = True,
+    via_velocities: ArrayLike | None = None,
     along: Along = "joint",
+    jerk_bound: bool = False,
+    average_torque: bool = False,
     vehicle: VehicleCase | None = None,
     reference: ArrayLike | None = None,
     step: float = STEP,
+    rate: float | None = None,
 ) -> Move:
     """A move from start to goal, rest to rest, checked on a grid finer than its samples.
 
     Args:
         start, goal: a pose's name, a joint position (5,) [rad, the extension in m], or a TipTarget.
-        profile: "cubic", "time-optimal" or "jerk-limited".
+        profile: "cubic", "quintic", "trapezoidal", "jerk-limited" or "time-optimal".
         duration: [s]; None is the least that the limits allow. A longer one slows the least-time motion evenly.
         pitch, hold: for tip targets. No pitch lets the hold choose it, no hold holds the actuator horizontal.
-        via: targets on the way, with a stop at each.
+        via: targets on the way.
+        stop_at_via: whether the move stops at them; else it goes through them on a smooth path.
+        via_velocities: (k, 5) [rad/s, the extension's m/s] at the k targets on the way, of the cubic that goes through them
+            without a stop; None makes its acceleration continuous instead.
         along: "joint" goes straight in joint space; "line" leads the tip straight from tip target to tip target at constant
             pitch; a point (3,) [m] leads it along the arc of a circle through that point.
+        jerk_bound: holds the time-optimal profile to the jerk limits, with no acceleration at the ends.
+        average_torque: holds the time-optimal profile to the gearboxes' average torque.
         vehicle: what the vehicle does during the move. The plan knows its slope; track and shock are in the checks alone.
         reference: joint position (5,) that the start of a tip line or arc is nearest to; None is the middle of the ranges.
-        step: sampling step [s].
+        step: longest sampling step [s].
+        rate: a controller's [Hz]: the samples are on its clock, and the move lasts a whole number of its periods, from stop
+            to stop. Takes the place of `step`.
 
     Raises:
         InputError: an input is malformed or not finite.
-        InfeasibleError: a target is out of reach or outside the limits, the duration is too short, or no motion keeps the
-            drives' limits.
+        InfeasibleError: a target is out of reach or outside the limits, the duration is too short, something to be kept
+            away from is in the way, or no motion keeps the drives' limits.
     """
-    try:
-        profile = Profile(profile)
-    except ValueError:
-        raise InputError(f"profile is {profile!r}; there are: {', '.join(Profile)}") from None
-    if duration is not None and not float(checked("duration", duration)) > 0.0:
-        raise InputError(f"duration is {duration:g} s; it must be above 0 s")
+    if via_velocities is not None:
+        stop_at_via = False
+        via_velocities = checked("via_velocities", via_velocities, 5)
+    timing = Timing.of(profile, duration, jerk_bound, average_torque, via_velocities, rate)
+    step = step if rate is None else 1.0 / rate
     if duration is not None:
         check_size(duration, step)
     hold = ActuatorHorizontal() if hold is None else hold
-    paths = _paths(boom, (start, *via, goal), pitch, hold, along, reference)
+    paths, notes = legs(boom, (start, *via, goal), pitch, hold, along, stop_at_via, reference)
     if not paths:
         q = resolve(boom, start, pitch, hold)
         note = "start and goal are the same joint position: an empty move, of no duration"
-        return _move(boom, profile, vehicle, at_rest(q, (note,)), None, ())
+        return _move(boom, timing.profile, vehicle, at_rest(q, (note,)), None, ())
     tilt = None if vehicle is None else BaseMotion.of(up=up_on_slope(vehicle.roll, vehicle.pitch))
-    laws = [_least_time_law(boom, path, profile, tilt) for path in paths]
-    factor = _stretch(sum(law.duration for law in laws), profile, duration)
-    motions = tuple(Motion(path, law.stretched(factor)) for path, law in zip(paths, laws, strict=True))
-    notes = tuple(path.sentence for path in paths if isinstance(path, TipPath))
+    motions = timed(boom, paths, timing, tilt)
     finer = step / CHECKS_PER_STEP
     if vehicle is not None and vehicle.peak != 0.0:
         finer = min(finer, vehicle.shock_duration / (2 * SHOCK_SAMPLES))
     coarse, fine = (joined([sample(motion, each) for motion in motions], notes) for each in (step, finer))
-    return _move(boom, profile, vehicle, coarse, fine, motions)
-
-
-def _paths(
-    boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, along: Along, reference: ArrayLike | None
-) -> list[Path]:
-    """A path between each target and the next, on branches that go on from each other; none between equal positions."""
-    if isinstance(along, str) and along == "joint":
-        stops: list[Array] = []
-        for target in targets:
-            stops.append(resolve(boom, target, pitch, hold, reference=stops[-1] if stops else None))
-        return [JointLine(a, b) for a, b in pairwise(stops) if not np.array_equal(a, b)]
-    if isinstance(along, str) and along != "line":
-        raise InputError(f"along is {along!r}; it must be 'joint', 'line' or a point of an arc")
-    if not isinstance(along, str) and len(targets) != 2:
-        raise InputError("an arc goes from one tip target to another, with no stop on the way")
-    if pitch is None:
-        raise InputError("a line or an arc of the tip goes at constant pitch, which must be given")
-    places = [_place(target) for target in targets]
-    paths: list[Path] = []
-    last = reference
-    for a, b in pairwise(places):
-        if np.array_equal(a, b):
-            continue
-        curve = TipLine(a, b) if isinstance(along, str) else TipArc.through(a, along, b)
-        path = follow(boom, curve, pitch, hold, reference=last)
-        paths.append(path)
-        last = path(1.0)
-    return paths
-
-
-def _place(target: Target) -> Array:
-    if not isinstance(target, TipTarget):
-        raise InputError(f"{target!r} is no tip target; a line or an arc of the tip goes between tip targets")
-    return checked("tip target", target.position)
+    return _move(boom, timing.profile, vehicle, coarse, fine, motions, tilt)
 
 
 def check(
@@ -251,9 +208,12 @@ def _move(
     trajectory: Trajectory,
     fine: Trajectory | None,
     motions: tuple[Motion, ...],
+    base: BaseMotion | None = None,
 ) -> Move:
     loads, parts, _ = _loads(boom, trajectory, vehicle)
     report = check(boom, trajectory if fine is None else fine, profile=profile, vehicle=vehicle)
+    if motions:
+        report = replace(report, certificate=certify(boom, motions, base), stop=worst_stop(boom, motions, base))
     return Move(boom, profile, trajectory, loads, parts, report, motions, vehicle)
 
 
@@ -262,33 +222,3 @@ def _vehicle_notes(vehicle: VehicleCase | None) -> tuple[str, ...]:
         return ()
     planned = "" if vehicle.is_steady else "; a plan knows its slope alone, the checks all of it"
     return (vehicle.sentence + planned,)
-
-
-def _least_time_law(boom: Boom, path: Path, profile: Profile, base: BaseMotion | None) -> TimeLaw:
-    """Each profile's third-party library is imported where it is used: they are slow to import."""
-    if profile is Profile.TIME_OPTIMAL:
-        from planner.profiles.time_optimal import time_optimal
-
-        law = time_optimal(boom, path, base)
-    elif profile is Profile.JERK_LIMITED:
-        from planner.profiles.jerk_limited import jerk_limited
-
-        law = jerk_limited(boom, path, base)
-    else:
-        from planner.profiles.cubic import cubic
-
-        law = cubic(boom, path, base)
-    if isinstance(path, TipPath):  # its curvature can peak between the points that a profile looks at
-        law = law.stretched(max(1.0, least_stretch(boom, path, law, base, samples=_CURVED_SAMPLES)))
-    return law
-
-
-def _stretch(least: float, profile: Profile, duration: float | None) -> float:
-    """The factor that slows the least duration to the one given."""
-    if duration is None:
-        return 1.0
-    if duration < least * (1.0 - _ROUNDING):
-        raise InfeasibleError(
-            f"duration {duration:g} s is too short: the {profile} profile needs at least {least:.6g} s within the limits"
-        )
-    return duration / least

@@ -22,6 +22,7 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -33,6 +34,7 @@ from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from boom_model.drives import STEPPER_MARGIN, available_torque, drive_inertia, drive_torque_limit, motor_torque
 from boom_model.frames import R_LINK_BODY, frame_transforms
+from boom_model.keep_out import Box, KeepOut
 from boom_model.reach import ReachMap
 from planner.drive_pictures import drive_picture
 from planner.files import replacing
@@ -215,9 +217,32 @@ def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
         # A cylinder lies along z, and these bodies' z is the pins' direction n.
         pins = rr.Cylinders3D(centers=centers, lengths=0.16, radii=0.018, colors=PIN_COLOR, fill_mode="solid")
         log(f"world/boom/{name}/pins", pins, name)
+    if boom.keep_out is not None:
+        _log_keep_out(recording, boom.keep_out)
     if boom.payload.mass > 0.0:
         radius = (boom.payload.mass / _STEEL * 0.75 / np.pi) ** (1.0 / 3.0)
         log("world/boom/tip", rr.Points3D([(0.0, 0.0, 0.0)], radii=radius, colors=PAYLOAD_COLOR), "tip")
+
+
+def _log_keep_out(recording: rr.RecordingStream, keep_out: KeepOut) -> None:
+    """The shapes that the arm keeps away from, as the mount carries them."""
+    look: dict[str, Any] = {"colors": [OUTSIDE_COLOR], "fill_mode": "majorwireframe"}
+    for shape in keep_out.shapes:
+        entity = rr.new_entity_path(["world", "keep_out", shape.name])
+        if isinstance(shape, Box):
+            solid: Any = rr.Boxes3D(centers=[shape.center], sizes=[shape.size], labels=[shape.name], **look)
+        else:
+            axis = shape.end - shape.start
+            turn, _ = Rotation.align_vectors([axis], [(0.0, 0.0, 1.0)]) if axis.any() else (Rotation.identity(), 0.0)
+            solid = rr.Capsules3D(
+                lengths=[float(np.linalg.norm(axis))],
+                radii=[shape.radius],
+                translations=[shape.start],
+                quaternions=[turn.as_quat()],
+                labels=[shape.name],
+                **look,
+            )
+        recording.log(entity, solid, rr.CoordinateFrame("mount"), static=True)
 
 
 def _boxes(low: Array, high: Array, color: Color) -> rr.Boxes3D:

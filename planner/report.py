@@ -8,8 +8,10 @@ import numpy as np
 from boom_model import JOINTS, Basis, Boom, Breakdown
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
+from planner.certificate import Certificate, WorstRatio
 from planner.checks import ANGLE_CHECKS
 from planner.rows import Row, Verdict, overall
+from planner.stopping import WorstStop
 
 
 @dataclass(frozen=True)
@@ -53,10 +55,17 @@ class Report:
     """Every assumed figure of the boom that the checks or the planner use."""
     peaks: tuple[TorquePeak, ...] = ()
     """Where each joint's largest torque comes from."""
+    certificate: Certificate | None = None
+    """Of a planned motion: the worst ratio to each limit, recomputed; None of a recorded one."""
+    stop: WorstStop | None = None
+    """Of a planned motion: the longest and the farthest stop on its way."""
+    remedies: tuple[str, ...] = ()
+    """Single changes that would mend a motion that fails, as far as they were looked for."""
 
     @property
     def verdict(self) -> Verdict:
-        return overall(self.rows)
+        """FAIL where a row fails or the certificate finds a limit broken, else that of the rows."""
+        return Verdict.FAIL if self.certificate is not None and self.certificate.broken else overall(self.rows)
 
     @property
     def summary(self) -> str:
@@ -64,10 +73,26 @@ class Report:
         failed = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.FAIL]
         unknown = list(dict.fromkeys(r.joint for r in self.rows if r.verdict is Verdict.NOT_CHECKABLE))
         warned = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.WARN]
+        if self.certificate is not None:
+            failed += [f"{worst.joint} {worst.limit} (certificate)" for worst in self.certificate.broken]
         parts = [f"failed: {', '.join(failed)}"] if failed else []
         parts += [f"passed only on estimated or assumed data: {', '.join(warned)}"] if warned else []
         parts += [f"not checkable for want of data: {', '.join(unknown)}"] if unknown else []
         return f"{self.verdict}: {'; '.join(parts) if parts else 'every check passed'}"
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What certificate and stop say, for people."""
+        said = []
+        if self.certificate is not None:
+            of, more = self.certificate, f"one more could add {self.certificate.residual:.0e} of a limit"
+            said.append(f"Certificate: recomputed at {of.samples} points; {of.iterations} solve(s), {more}")
+        if self.stop is not None:
+            said.append(
+                f"Stopping: at worst {self.stop.time_s:.2f} s ({self.stop.time_way}, begun at {self.stop.time_at_s:.2f} s) and "
+                f"{self.stop.distance_m:.2f} m of the tip ({self.stop.distance_way}, begun at {self.stop.distance_at_s:.2f} s)"
+            )
+        return tuple(said)
 
     def to_json(self, files: dict[str, str]) -> dict[str, Any]:
         """The JSON object of `boom plan` and `boom check`, in SI."""
@@ -79,6 +104,9 @@ class Report:
             "notes": list(self.notes),
             "assumptions": list(self.assumptions),
             "torque_peaks": [asdict(peak) for peak in self.peaks],
+            "certificate": None if self.certificate is None else asdict(self.certificate),
+            "stop": None if self.stop is None else asdict(self.stop),
+            "remedies": list(self.remedies),
             "files": files,
         }
 
@@ -98,7 +126,12 @@ class Report:
             lines += ["", "## Largest torques and where they come from", "", "| " + " | ".join(PEAK_HEADER) + " |"]
             lines += ["|" + " --- |" * len(PEAK_HEADER)]
             lines += ["| " + " | ".join(peak_cells(peak)) + " |" for peak in self.peaks]
-        for title, texts in (("Notes", self.notes), ("Assumed", self.assumptions)):
+        if self.certificate is not None:
+            lines += ["", "## Certificate", "", "| " + " | ".join(CERTIFICATE_HEADER) + " |"]
+            lines += ["|" + " --- |" * len(CERTIFICATE_HEADER)]
+            lines += ["| " + " | ".join(worst_cells(worst)) + " |" for worst in self.certificate.worst]
+        lines += [f"\n{sentence}" for sentence in self.sentences]
+        for title, texts in (("Would mend it", self.remedies), ("Notes", self.notes), ("Assumed", self.assumptions)):
             if texts:
                 lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
         return "\n".join(lines) + "\n"
@@ -109,10 +142,10 @@ def cells(row: Row) -> tuple[str, ...]:
     factor, unit = _for_people(row)
     if row.margin is None:
         margin = "-"
-    elif row.check in ANGLE_CHECKS:
+    elif row.check in ANGLE_CHECKS or row.joint == "arm":
         margin = f"{row.margin * factor:.4g} {unit}"
     else:
-        margin = f"{row.margin:.0%}"
+        margin = f"{round(row.margin, 2) + 0.0:.0%}"  # no -0%
     return (
         row.joint,
         row.check,
@@ -129,6 +162,14 @@ def cells(row: Row) -> tuple[str, ...]:
 def _rounded(value: float) -> str:
     """Four digits, and no power of ten below a million million."""
     return f"{float(f'{value:.4g}'):.12g}"
+
+
+CERTIFICATE_HEADER = ("limit", "joint", "worst ratio", "at")
+
+
+def worst_cells(worst: WorstRatio) -> tuple[str, ...]:
+    """A certificate's worst ratio for people, under CERTIFICATE_HEADER."""
+    return (worst.limit, worst.joint, f"{worst.ratio:.4f}", f"{worst.at_s:.2f} s")
 
 
 PEAK_HEADER = ("joint", "at", "total", "gravity", "inertia", "velocity", "payload", "friction", "vehicle")
@@ -188,6 +229,15 @@ def assumptions(boom: Boom, jerk_limited: bool) -> tuple[str, ...]:
     for name, bearable in (("force", boom.mount.force), ("moment", boom.mount.moment)):
         if bearable is not None and bearable.origin.basis is Basis.ASSUMED:
             sentences.append(f"{name} that the mount bears, {bearable.value:g}: {bearable.origin.source}")
+    keep = boom.keep_out
+    if keep is not None:
+        if keep.origin.basis is Basis.ASSUMED:
+            lengths = (
+                f"clearance {keep.clearance:g} m, radius of links {keep.link_radius:g} m, of payload {keep.payload_radius:g} m"
+            )
+            sentences.append(f"{lengths}: {keep.origin.source}")
+        assumed = [shape for shape in keep.shapes if shape.origin.basis is Basis.ASSUMED]
+        sentences += [f"{shape.name} to keep away from: {shape.origin.source}" for shape in assumed]
     if limits.origins["transmission"][0].basis is Basis.ASSUMED:
         angle = np.degrees(limits.transmission)
         sentences.append(f"transmission angle warned of below {angle:g} deg: {limits.origins['transmission'][0].source}")

@@ -85,6 +85,15 @@ def parse_along(text: str) -> str | Array:
     return np.array(_numbers(text, rest, 3))
 
 
+def parse_joint_velocity(text: str) -> Array:
+    """A joint velocity (5,) as people write it: deg/s and the extension's m/s, five numbers with commas, in SI.
+
+    Raises:
+        InputError: the numbers are malformed, not finite, or too many or too few.
+    """
+    return _joint_position(text, text)
+
+
 def parse_hold(text: str) -> Hold:
     """A hold as people write it; `actuator=DEG` is the actuator's elevation above the horizontal.
 

@@ -188,7 +188,7 @@ def test_bad_input_gets_one_line_and_its_code_and_leaves_no_file(boom, tmp_path,
     assert message in err
     assert err.startswith("boom: ")
     assert err.count("\n") == 1
-    assert out == ""
+    assert all(line.startswith("Would mend it: ") for line in out.splitlines())
     assert set(os.listdir(tmp_path)) <= {"bad.toml", "twice.csv"}
 
 

@@ -2,14 +2,13 @@
 
 from dataclasses import replace
 
-import matplotlib.figure
 import numpy as np
 import pytest
 
 from boom_model import Boom, InputError, tip_deflection
 from boom_model.drives import available_torque, motor_torque
 from planner import plan
-from planner.drive_pictures import drive_picture, write_drive_picture
+from planner.drive_pictures import drive_figure, write_drive_picture
 from planner.missions import check_cycle, load_mission, plan_cycle
 from planner.planning import torques
 
@@ -17,17 +16,9 @@ BOOM = Boom.load()
 MOVE = plan(BOOM, "transport", "phenotyping", step=0.05)
 
 
-@pytest.fixture
-def drawn(monkeypatch):
-    """Draws a page without rendering it; returns its panels by title."""
-
-    def draw(boom=BOOM, trajectory=MOVE.trajectory, tau=MOVE.loads.tau, report=MOVE.report, parts=()):
-        figures = []
-        monkeypatch.setattr(matplotlib.figure.Figure, "savefig", lambda figure, *_, **__: figures.append(figure))
-        drive_picture(boom, trajectory, tau, report, parts)
-        return {axes.get_title(): axes for axes in figures[0].axes}
-
-    return draw
+def drawn(boom=BOOM, trajectory=MOVE.trajectory, tau=MOVE.loads.tau, report=MOVE.report, parts=()):
+    """A page's panels by title."""
+    return {axes.get_title(): axes for axes in drive_figure(boom, trajectory, tau, report, parts).axes}
 
 
 def curves(axes):
@@ -35,7 +26,7 @@ def curves(axes):
 
 
 @pytest.mark.parametrize(("i", "joint"), [(1, "inner"), (2, "lower")])
-def test_the_plane_holds_the_motion_both_ways_and_the_curve(drawn, i, joint):
+def test_the_plane_holds_the_motion_both_ways_and_the_curve(i, joint):
     drive, motion = BOOM.drives[i], MOVE.trajectory
     found = curves(drawn()[f"{joint}: MST342C02"])
     speed = 160 * np.abs(motion.qd[:, i])
@@ -47,13 +38,13 @@ def test_the_plane_holds_the_motion_both_ways_and_the_curve(drawn, i, joint):
     np.testing.assert_allclose(found["with 50% margin"][:, 1], curve[:, 1] / 1.5, rtol=1e-12)
 
 
-def test_the_gearbox_has_its_ratings_beside_it(drawn):
+def test_the_gearbox_has_its_ratings_beside_it():
     found = curves(drawn()["inner: CBG320160"])
     np.testing.assert_allclose(found["torque, size"][:, 1], np.abs(MOVE.loads.tau[:, 1]), rtol=1e-12)
     assert {f"{name} Nm" for name in ("rated 172", "largest average 275", "start-stop 460")} <= found.keys()
 
 
-def test_every_margin_is_a_bar(drawn):
+def test_every_margin_is_a_bar():
     axes = drawn()["lower: margins"]
     rows = {r.check: r for r in MOVE.report.rows if r.joint == "lower" and r.check.startswith(("gearbox", "motor"))}
     names = [label.get_text() for label in axes.get_yticklabels()]
@@ -62,13 +53,13 @@ def test_every_margin_is_a_bar(drawn):
     assert lengths == pytest.approx([np.clip(rows[n].margin, -1, 3) for n in names if rows[n].margin is not None])
 
 
-def test_the_tips_budget_is_in_millimetres(drawn):
+def test_the_tips_budget_is_in_millimetres():
     axes = next(axes for title, axes in drawn().items() if title.startswith("tip"))
     budget = tip_deflection(BOOM, MOVE.trajectory.q, MOVE.loads.tau)
     np.testing.assert_allclose(curves(axes)["in all"][:, 1], 1e3 * budget.total, rtol=1e-12)
 
 
-def test_a_missions_moves_stand_end_to_end(drawn):
+def test_a_missions_moves_stand_end_to_end():
     cycle = plan_cycle(BOOM, load_mission("field-day"))
     moves = [samples for leg, samples in cycle.slices() if leg.moves]
     panels = drawn(BOOM, cycle.trajectory, torques(BOOM, cycle.trajectory), check_cycle(BOOM, cycle), moves)
@@ -80,7 +71,7 @@ def test_a_missions_moves_stand_end_to_end(drawn):
     assert [a for a, _ in ends] == pytest.approx([0.0, *np.cumsum(durations)[:-1]])
 
 
-def test_without_a_supply_the_running_torque_stands_for_the_curve(drawn):
+def test_without_a_supply_the_running_torque_stands_for_the_curve():
     boom = replace(BOOM, drives=tuple(d and replace(d, bus_voltage=None) for d in BOOM.drives))
     found = curves(drawn(boom=boom)["inner: MST342C02"])
     assert "running torque; the curve needs voltage and wiring" in found

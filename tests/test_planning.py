@@ -79,7 +79,7 @@ def test_report_as_json_has_the_documented_form():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"profile": "quintic"}, "profile is 'quintic'"),
+        ({"profile": "septic"}, "profile is 'septic'"),
         ({"duration": 0.0}, "duration is 0 s"),
         ({"duration": np.nan}, "duration is nan"),
         ({"step": -1.0}, "step is -1"),

@@ -1,0 +1,27 @@
+"""Thirty kilograms on a boom made for ten: what fails, where, and what would mend it.
+
+    python3 demos/07_an_infeasible_plan_explained.py
+
+Learn: an infeasible plan names the joint, the limit and the place, splits the demand into its parts, and offers the smallest
+single changes that work; each has been planned again before it is offered.
+"""
+
+from boom_model import Boom, InfeasibleError
+from planner import plan
+from planner.remedies import remedies
+
+
+def main() -> None:
+    heavy = Boom.load().with_payload(30.0)
+    for options in ({"profile": "time-optimal"}, {"duration": 3.0}):
+        boom = heavy if "profile" in options else Boom.load()
+        try:
+            plan(boom, "transport", "phenotyping", **options)
+        except InfeasibleError as error:
+            print(error)
+        for remedy in remedies(boom, "transport", "phenotyping", **options):
+            print(f"  would mend it: {remedy.sentence}")
+
+
+if __name__ == "__main__":
+    main()

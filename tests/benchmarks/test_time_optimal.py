@@ -1,0 +1,132 @@
+"""Planning time of the time-optimal law under the drives' limits, against toppra called directly with Pinocchio's `rnea`.
+
+Same path, same 500 steps, same discretisation. The peer's torques have constant limits, the motors' at standstill: what
+toppra holds in one solve. It breaks the motors' torque-speed curve wherever that counts, which the peak ratios show. Run it
+alone for the numbers: `pytest tests/benchmarks/test_time_optimal.py -s`.
+"""
+
+import logging
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pinocchio
+import pytest
+import toppra
+from toppra.algorithm import TOPPRA
+from toppra.constraint import (
+    DiscretizationType,
+    JointAccelerationConstraint,
+    JointTorqueConstraint,
+    JointVelocityConstraint,
+)
+
+from boom_model import Boom
+from boom_model.arrays import Array
+from planner import JointLine, Motion
+from planner.profiles.time_optimal import GRID_INTERVALS, time_optimal
+from tests.benchmarks.test_inverse_dynamics import fixed_root
+from tests.minimum_time import AT_STANDSTILL, DRIVEN, INERTIA, throughout, worst_ratios
+from tests.oracles import pinocchio_model, tree_matrix
+
+BOOM = Boom.load()
+PATH = JointLine(BOOM.pose("transport"), BOOM.pose("phenotyping"))
+ROUNDS = 9  # of both in turn, of which the best counts
+PEER_SAMPLES = 5_001
+
+States = tuple[Array, Array, Array]
+
+
+def raised(boom: Boom) -> Boom:
+    limits = boom.limits
+    return replace(boom, limits=replace(limits, velocity=3.0 * limits.velocity, acceleration=10.0 * limits.acceleration))
+
+
+BOOMS = {
+    "10 kg": BOOM,
+    "24 kg": BOOM.with_payload(24.0),
+    "24 kg, joint limits raised": raised(BOOM.with_payload(24.0)),
+}
+
+
+@pytest.fixture(autouse=True)
+def quiet() -> Iterator[None]:
+    log = logging.getLogger("toppra")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    yield
+    log.setLevel(level)
+
+
+def ours(boom: Boom) -> Callable[[], Motion]:
+    return lambda: Motion(PATH, time_optimal(boom, PATH))
+
+
+def peers(boom: Boom) -> Callable[[], object]:
+    """toppra on the tree without a free root, the drives' inertia added; joints without a drive get no limit to speak of."""
+    model, G = fixed_root(pinocchio_model(boom)), tree_matrix(boom)
+    data, rotors, torque = model.createData(), np.zeros(5), np.full(5, 1e6)
+    rotors[DRIVEN], torque[DRIVEN] = INERTIA, AT_STANDSTILL
+    back = np.ascontiguousarray(G.T)
+    scheme = DiscretizationType.Interpolation
+
+    def inverse_dynamics(q: Array, qd: Array, qdd: Array) -> Array:
+        return back @ pinocchio.rnea(model, data, G @ q, G @ qd, G @ qdd) + rotors * qdd
+
+    def both_ways(limit: Array) -> Array:
+        return np.stack([-limit, limit], axis=-1)
+
+    def run() -> object:
+        constraints = [
+            JointVelocityConstraint(both_ways(boom.limits.velocity)),
+            JointAccelerationConstraint(both_ways(boom.limits.acceleration), discretization_scheme=scheme),
+            JointTorqueConstraint(inverse_dynamics, both_ways(torque), np.zeros(5), discretization_scheme=scheme),
+        ]
+        path = toppra.SplineInterpolator([0.0, 1.0], np.stack([PATH.start, PATH.goal]))
+        grid = np.linspace(0.0, 1.0, GRID_INTERVALS + 1)
+        solver = TOPPRA(constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel", solver_wrapper="seidel")
+        return solver.compute_trajectory(0.0, 0.0)
+
+    return run
+
+
+METHODS = (ours, peers)
+
+
+def peaks(boom: Boom, planned) -> dict[str, float]:
+    if isinstance(planned, Motion):
+        return worst_ratios(boom, *throughout(planned))
+    t = np.linspace(0.0, planned.duration, PEER_SAMPLES)
+    return worst_ratios(boom, *(planned(t, order) for order in range(3)))
+
+
+@pytest.mark.benchmark(max_time=0.5)
+@pytest.mark.parametrize("name", BOOMS)
+@pytest.mark.parametrize("method", METHODS)
+def test_time(benchmark, name, method):
+    benchmark.group = f"time-optimal law, {name}"
+    planned = benchmark(method(BOOMS[name]))
+    benchmark.extra_info |= {"duration_s": planned.duration} | peaks(BOOMS[name], planned)
+
+
+@pytest.mark.parametrize("name", BOOMS)
+def test_planning_takes_no_longer_than_the_peers_and_keeps_what_that_breaks(name):
+    """0.37 to 0.74 of the peer's time were seen."""
+    boom, best, planned = BOOMS[name], dict.fromkeys(METHODS, np.inf), {}
+    for _ in range(ROUNDS):
+        for method in METHODS:
+            run = method(boom)
+            start = time.process_time()
+            planned[method] = run()
+            best[method] = min(best[method], time.process_time() - start)
+    kept = {method: peaks(boom, planned[method]) for method in METHODS}
+    for method in METHODS:
+        ratios = ", ".join(f"{limit} {ratio:.4f}" for limit, ratio in kept[method].items())
+        print(f"{name}: {method.__name__:5} {1e3 * best[method]:5.1f} ms, move {planned[method].duration:.4f} s, {ratios}")
+    print(f"{name}: {best[ours] / best[peers]:.2f} of the peer's time")
+    assert max(kept[ours].values()) <= 1.001
+    assert kept[peers]["motor at standstill"] <= 1.001
+    if boom is not BOOM:
+        assert kept[peers]["motor on its curve"] > 1.5
+    assert best[ours] < best[peers]
