@@ -2,10 +2,13 @@
 
 from planner.certificate import Certificate, WorstRatio, certify
 from planner.checks import average_torque
+from planner.comparison import Comparison, Log, compare, read_log
 from planner.constraints import InfeasiblePathError
 from planner.missions import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
+from planner.model_export import mjcf, urdf, write_model
+from planner.motion_files import read_motion, write_motion
 from planner.path import JointLine, Path
-from planner.planning import Move, check, plan
+from planner.planning import Move, check, examine, plan, torques
 from planner.report import Report
 from planner.rows import Row, Verdict
 from planner.sizing import Adapt, Choice, Judged, candidates, choose, size
@@ -19,11 +22,13 @@ __all__ = [
     "Adapt",
     "Certificate",
     "Choice",
+    "Comparison",
     "Cycle",
     "InfeasiblePathError",
     "JointLine",
     "Judged",
     "Leg",
+    "Log",
     "Mission",
     "Motion",
     "Move",
@@ -44,15 +49,24 @@ __all__ = [
     "check",
     "check_cycle",
     "choose",
+    "compare",
+    "examine",
     "load_mission",
+    "mjcf",
     "parse_hold",
     "parse_pitch",
     "parse_target",
     "plan",
     "plan_cycle",
     "read_csv",
+    "read_log",
+    "read_motion",
     "sample",
     "size",
     "stop",
+    "torques",
+    "urdf",
     "write_csv",
+    "write_model",
+    "write_motion",
 ]

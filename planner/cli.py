@@ -390,8 +390,8 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
 
 
 @cli.command()
-@click.argument("motion", metavar="IN.csv")
-@click.option("--out", required=True, metavar="OUT.csv", help="The motion with tau1..tau5 appended.")
+@click.argument("motion", metavar="IN")
+@click.option("--out", required=True, metavar="OUT", help="The motion with its torques: .csv, .parquet, .yaml or .json.")
 @payload_option
 @payload_as_option
 @boom_option
@@ -399,41 +399,43 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
 def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
     """Inverse dynamics of a motion: the torque of each joint at each sample, with its friction where the boom's file gives it.
 
-    IN.csv holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
+    IN is a CSV or Parquet file that holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
 
     \b
     Example:
       boom torque move.csv --out torques.csv --payload 8
     """
     from boom_model import JOINTS
+    from planner.motion_files import form_of, read_motion, write_motion
     from planner.planning import torques
-    from planner.trajectory import read_csv, write_csv
 
-    boom, trajectory = _load(boom_file, payload), read_csv(motion)
+    form = form_of(out)
+    boom, trajectory = _load(boom_file, payload), read_motion(motion)
     tau = torques(boom, trajectory, payload_as)
-    write_csv(trajectory, out, tau)
+    write_motion(trajectory, out, tau)
     at = np.abs(tau).argmax(axis=0)
     peaks = [
         {"joint": joint, "tau": float(tau[k, i]), "unit": "N" if i == 3 else "Nm", "at_s": float(trajectory.t[k])}
         for i, (joint, k) in enumerate(zip(JOINTS, at, strict=True))
     ]
     if as_json:
-        _print_json({"peaks": peaks, "notes": list(trajectory.notes), "files": {"csv": out}})
+        _print_json({"peaks": peaks, "notes": list(trajectory.notes), "files": {form[1:]: out}})
         return 0
     table = _table("joint", "peak", "at")
     for peak in peaks:
         table.add_row(str(peak["joint"]), f"{peak['tau']:.3f} {peak['unit']}", f"{peak['at_s']:.3f} s")
     _console().print(table)
     _print_lines("Note", trajectory.notes)
-    click.echo(f"csv: {out}")
+    click.echo(f"{form[1:]}: {out}")
     return 0
 
 
 @cli.command()
-@click.argument("motion", metavar="IN.csv")
+@click.argument("motion", metavar="IN")
 @payload_option
 @payload_as_option
 @vehicle_option
+@click.option("--out", metavar="FILE.rrd", help="A recording of the motion, for `boom view`.")
 @report_option
 @picture_option
 @boom_option
@@ -443,40 +445,162 @@ def check(
     payload: float | None,
     payload_as: Any,
     vehicle: str | None,
+    out: str | None,
     picture: str | None,
     document: str | None,
     boom_file: str | None,
     as_json: bool,
 ) -> int:
-    """Hold any motion against the joint limits and the drives' datasheets.
+    """Hold any motion against the joint limits and the drives' datasheets. IN is a CSV or Parquet file.
 
     \b
     Example:
       boom plan transport phenotyping --csv move.csv
-      boom check move.csv --payload 8
+      boom check move.csv --payload 8 --out checked.rrd
     """
     from planner.files import check_writable
-    from planner.planning import check as check_motion
-    from planner.planning import torques
-    from planner.trajectory import read_csv
+    from planner.motion_files import read_motion
+    from planner.planning import examine
     from planner.vehicle import load_case
 
     _require_document(document)
-    boom, trajectory = _load(boom_file, payload), read_csv(motion)
-    case = None if vehicle is None else load_case(vehicle)
     _check_picture(picture)
-    check_writable(picture)
-    report = check_motion(boom, trajectory, payload_as=payload_as, vehicle=case)
+    check_writable(out, document, picture)
+    boom, trajectory = _load(boom_file, payload), read_motion(motion)
+    case = None if vehicle is None else load_case(vehicle)
+    move = examine(boom, trajectory, payload_as=payload_as, vehicle=case)
     written: dict[str, str] = {}
-    if picture is not None or document is not None:
-        tau = torques(boom, trajectory, payload_as, case)
-        _write_document(document, report, boom, trajectory, tau, written)
-        if picture is not None:
-            from planner.drive_pictures import write_drive_picture
+    if out is not None:
+        from planner.recording import write_recording
 
-            write_drive_picture(picture, boom, trajectory, tau, report)
-            written["picture"] = picture
-    return _print_report(report, written, as_json)
+        write_recording(out, move)
+        written["recording"] = out
+    if document is not None:
+        _write_document(document, move.report, boom, trajectory, move.loads.tau, written)
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        write_drive_picture(picture, boom, trajectory, move.loads.tau, move.report)
+        written["picture"] = picture
+    return _print_report(move.report, written, as_json)
+
+
+@cli.command()
+@click.argument("motion", metavar="IN")
+@click.argument("out", metavar="OUT")
+def export(motion: str, out: str) -> int:
+    """Turn a motion into another tool's form, by the ending of OUT.
+
+    \b
+    .csv          t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, and tau1..tau5 where IN has them
+    .parquet      the same columns, with their units
+    .yaml, .json  ROS trajectory_msgs/JointTrajectory
+
+    IN is a CSV or Parquet file; its torques go along as they are.
+
+    \b
+    Examples:
+      boom export move.csv move.parquet
+      boom torque move.csv --out torques.csv && boom export torques.csv move.yaml
+    """
+    from planner.motion_files import form_of, read_quantities, write_motion
+    from planner.trajectory import trajectory_of
+
+    form = form_of(out)
+    data, notes = read_quantities(motion)
+    trajectory = trajectory_of(motion, data, notes)
+    write_motion(trajectory, out, data.get("tau"))
+    _print_lines("Note", trajectory.notes)
+    click.echo(f"{form[1:]}: {out}")
+    return 0
+
+
+@cli.command()
+@click.argument("out", metavar="OUT.urdf|OUT.xml")
+@payload_option
+@boom_option
+def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
+    """Write the boom, with its payload, as URDF or as MJCF for MuJoCo (.xml).
+
+    \b
+    URDF  a tree: mimic joints keep the parallelogram. A torque that a tool computes for a
+          mimic joint belongs to the joint that it mimics.
+    MJCF  the loop closed by a constraint, a motor on each joint, the named poses as keyframes.
+
+    \b
+    Example:
+      boom export-model boom.urdf --payload 8
+    """
+    from planner.model_export import write_model
+
+    write_model(_load(boom_file, payload), out)
+    click.echo(f"model: {out}")
+    return 0
+
+
+@cli.command(context_settings={"ignore_unknown_options": True})  # so that --offset takes -0.5
+@click.argument("planned", metavar="PLANNED")
+@click.argument("measured", metavar="MEASURED")
+@click.option(
+    "--offset", default="0", show_default=True, metavar="S|best",
+    help="Added to the log's times; best fits them to the plan, and so hides a delay of the drives.",
+)  # fmt: skip
+@click.option("--window", type=float, metavar="S", help="Width of the filter that differentiates the log; else 0.2 s.")
+@click.option("--out", metavar="FILE.rrd", help="A recording of both, for `boom view`.")
+@payload_option
+@payload_as_option
+@boom_option
+@json_option
+def compare(
+    planned: str,
+    measured: str,
+    offset: str,
+    window: float | None,
+    out: str | None,
+    payload: float | None,
+    payload_as: Any,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Hold a measured motion against its plan: where joints and tip were, and what torques that takes.
+
+    PLANNED and MEASURED are CSV or Parquet files. MEASURED holds t, q1..q5 in SI, and any of qd1..qd5, qdd1..qdd5 and
+    tau1..tau5; derivatives that it lacks come from a Savitzky-Golay filter, whose noise is reported.
+
+    \b
+    Example:
+      boom compare move.csv log.csv --offset best --out both.rrd
+    """
+    from planner.comparison import WINDOW, read_log
+    from planner.comparison import compare as compare_motions
+    from planner.files import check_writable
+    from planner.motion_files import read_motion
+
+    try:
+        shift = None if offset == "best" else float(offset)
+    except ValueError:
+        raise InputError(f"offset {offset!r} is neither a number of seconds nor best") from None
+    check_writable(out)
+    found = compare_motions(
+        _load(boom_file, payload),
+        read_motion(planned),
+        read_log(measured),
+        offset=shift,
+        window=WINDOW if window is None else window,
+        payload_as=payload_as,
+    )
+    written = {}
+    if out is not None:
+        from planner.recording import write_comparison_recording
+
+        write_comparison_recording(out, found)
+        written["recording"] = out
+    answer = found.to_json(written)
+    if as_json:
+        _print_json(answer)
+        return 0
+    _print_comparison(answer)
+    return 0
 
 
 @cli.command()
@@ -509,11 +633,11 @@ def mission(
       boom mission field-day --picture drives.png
       boom mission table-2-4 table-3-1 --joint inner --joint lower
     """
-    from planner.comparison import compared, comparison_markdown
     from planner.files import check_writable, write_text
     from planner.missions import check_cycle, load_mission, plan_cycle
     from planner.planning import torques
     from planner.rows import Verdict
+    from planner.side_by_side import compared, comparison_markdown
     from planner.vehicle import load_case
 
     boom, case = _load(boom_file, payload), None if vehicle is None else load_case(vehicle)
@@ -657,6 +781,27 @@ def _load(boom_file: str | None, payload: float | None = None) -> Boom:
 def _check_picture(picture: str | None) -> None:
     if picture is not None and not picture.endswith(".png"):
         raise InputError(f"{picture}: the drives' page is written as .png")
+
+
+def _print_comparison(answer: dict[str, Any]) -> None:
+    from planner.comparison import POSITION_HEADER, TORQUE_HEADER, position_cells, summary, torque_cells
+
+    console = _console()
+    for title, header, cells in (
+        ("Positions, measured less planned", POSITION_HEADER, position_cells),
+        ("Torques on level ground: the model's of the measured motion less the plan's, and the log's less the model's",
+         TORQUE_HEADER, torque_cells),
+    ):  # fmt: skip
+        console.print(title, highlight=False)
+        table = _table(*header)
+        for joint in answer["joints"]:
+            table.add_row(*cells(joint))
+        console.print(table)
+    _print_lines("Note", tuple(answer["notes"]))
+    for line in summary(answer):
+        console.print(line, highlight=False, soft_wrap=True)
+    for kind, name in answer["files"].items():
+        click.echo(f"{kind}: {name}")
 
 
 def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:

@@ -14,14 +14,16 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from boom_model import Basis, Boom, InfeasibleError, InputError, Origin, Sourced, forward_kinematics
+from boom_model import BaseMotion, Basis, Boom, InfeasibleError, InputError, Origin, Sourced, forward_kinematics, up_on_slope
 from boom_model.arrays import Array, read_only
 from boom_model.dynamics import PayloadAs
 from boom_model.toml_file import Positive, Table, read_toml
 from planner.duty import Duty, trapezoid_weights
-from planner.planning import CHECKS_PER_STEP, check, plan
+from planner.legs import legs
+from planner.planning import CHECKS_PER_STEP, check
 from planner.report import Report
 from planner.targets import TipTarget, parse_along, parse_hold, parse_pitch, parse_target, resolve
+from planner.timing import Timing, timed
 from planner.trajectory import STEP, Trajectory, joined, sample
 from planner.vehicle import VehicleCase
 
@@ -295,26 +297,15 @@ def _move(
     along, target = parse_along(part.along), parse_target(str(part.to))
     by_joints = isinstance(along, str) and along == "joint"
     x, y, z = (float(v) for v in forward_kinematics(boom, q).position)
-    move = plan(
-        boom,
-        q if by_joints else TipTarget((x, y, z)),
-        target,
-        profile=part.profile,
-        duration=part.duration_s,
-        pitch=parse_pitch(part.pitch),
-        hold=parse_hold(part.hold),
-        via=[parse_target(text) for text in part.via],
-        stop_at_via=not part.pass_via,
-        along=along,
-        jerk_bound=part.jerk_bound,
-        average_torque=part.average_torque,
-        vehicle=vehicle,
-        reference=q,
-        step=step,
-    )
-    if not move.motions:
+    timing = Timing.of(part.profile, part.duration_s, part.jerk_bound, part.average_torque)
+    targets = (q if by_joints else TipTarget((x, y, z)), *(parse_target(text) for text in part.via), target)
+    pitch, hold = parse_pitch(part.pitch), parse_hold(part.hold)
+    paths, said = legs(boom, targets, pitch, hold, along, not part.pass_via, reference=q)
+    if not paths:
         return None, q, ()
-    fine = joined([sample(motion, step / CHECKS_PER_STEP) for motion in move.motions])
+    tilt = None if vehicle is None else BaseMotion.of(up=up_on_slope(vehicle.roll, vehicle.pitch))
+    motions = timed(boom, paths, timing, tilt)
+    fine = joined([sample(motion, step / CHECKS_PER_STEP) for motion in motions])
     apart = float(np.abs(fine.q[0] - q).max())
     if apart > _SAME_POSITION:
         raise InfeasibleError(
@@ -323,4 +314,4 @@ def _move(
         )
     way = part.to if by_joints else f"{part.to} along {part.along}"
     label = " ".join([f"to {way}", *(f"via {text}" for text in part.via)])
-    return Leg(label, fine, moves=True, powered=True), fine.q[-1], tuple(move.trajectory.notes)
+    return Leg(label, fine, moves=True, powered=True), fine.q[-1], said

@@ -42,17 +42,18 @@ SHOCK_SAMPLES = 20
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A planned move, its loads, and what the checks say of it."""
+    """A move, its loads, and what the checks say of it."""
 
     boom: Boom
-    profile: Profile
+    profile: str
+    """A `Profile`, or what a motion from elsewhere is called."""
     trajectory: Trajectory
     loads: Loads
     parts: Breakdown
     """The torques' breakdown, friction included."""
     report: Report
     motions: tuple[Motion, ...]
-    """The continuous motions behind the samples, from stop to stop; none of an empty move."""
+    """The continuous motions behind a plan's samples, from stop to stop; none of an empty move or a motion from elsewhere."""
     vehicle: VehicleCase | None = None
 
 
@@ -72,7 +73,6 @@ def plan(
     jerk_bound: bool = False,
     average_torque: bool = False,
     vehicle: VehicleCase | None = None,
-    reference: ArrayLike | None = None,
     step: float = STEP,
     rate: float | None = None,
 ) -> Move:
@@ -92,7 +92,6 @@ def plan(
         jerk_bound: holds the time-optimal profile to the jerk limits, with no acceleration at the ends.
         average_torque: holds the time-optimal profile to the gearboxes' average torque.
         vehicle: what the vehicle does during the move. The plan knows its slope; track and shock are in the checks alone.
-        reference: joint position (5,) that the start of a tip line or arc is nearest to; None is the middle of the ranges.
         step: longest sampling step [s].
         rate: a controller's [Hz]: the samples are on its clock, and the move lasts a whole number of its periods, from stop
             to stop. Takes the place of `step`.
@@ -101,6 +100,10 @@ def plan(
         InputError: an input is malformed or not finite.
         InfeasibleError: a target is out of reach or outside the limits, the duration is too short, something to be kept
             away from is in the way, or no motion keeps the drives' limits.
+
+    >>> move = plan(Boom.load(), "transport", "phenotyping", profile="time-optimal")
+    >>> round(move.report.duration, 3), str(move.report.verdict)
+    (4.333, 'INCOMPLETE')
     """
     if via_velocities is not None:
         stop_at_via = False
@@ -110,7 +113,7 @@ def plan(
     if duration is not None:
         check_size(duration, step)
     hold = ActuatorHorizontal() if hold is None else hold
-    paths, notes = legs(boom, (start, *via, goal), pitch, hold, along, stop_at_via, reference)
+    paths, notes = legs(boom, (start, *via, goal), pitch, hold, along, stop_at_via)
     if not paths:
         q = resolve(boom, start, pitch, hold)
         note = "start and goal are the same joint position: an empty move, of no duration"
@@ -141,9 +144,22 @@ def check(
         profile: what the report calls the motion.
         duty: the cycle that the samples stand for; None is the motion alone.
     """
+    return examine(boom, trajectory, payload_as=payload_as, vehicle=vehicle, profile=profile, duty=duty).report
+
+
+def examine(
+    boom: Boom,
+    trajectory: Trajectory,
+    *,
+    payload_as: PayloadAs = "mass",
+    vehicle: VehicleCase | None = None,
+    profile: str = "recorded",
+    duty: Duty | None = None,
+) -> Move:
+    """Any motion with its loads and its checks, as `write_recording` takes it; for the arguments see `check`."""
     loads, parts, base = _loads(boom, trajectory, vehicle, payload_as)
     shock = None if vehicle is None or vehicle.peak == 0.0 else _shock(boom, trajectory, vehicle, payload_as)
-    return Report(
+    report = Report(
         profile=str(profile),
         duration=trajectory.duration if duty is None else duty.duration,
         rows=check_rows(
@@ -160,6 +176,7 @@ def check(
         assumptions=assumptions(boom, trajectory.qddd is not None),
         peaks=torque_peaks(trajectory.t, parts),
     )
+    return Move(boom, str(profile), trajectory, loads, parts, report, (), vehicle)
 
 
 def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None) -> Array:
@@ -168,7 +185,8 @@ def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", 
     Raises:
         InputError: as `inverse_dynamics`, or a torque is not finite.
     """
-    return _loads(boom, trajectory, vehicle, payload_as)[0].tau
+    base = None if vehicle is None else base_motion(vehicle, trajectory.t)
+    return _finite_loads(boom, trajectory, base, payload_as, reactions=False).tau
 
 
 def _loads(
@@ -177,18 +195,32 @@ def _loads(
     """Loads with friction, their breakdown, and the base's motion.
 
     Raises:
-        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+        InputError: as `_finite_loads`.
     """
     base = None if vehicle is None else base_motion(vehicle, trajectory.t)
     states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    loads = _finite_loads(boom, trajectory, base, payload_as)
     with np.errstate(over="ignore", invalid="ignore"):
-        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True)
-        finite = np.isfinite(loads.tau).all(axis=-1)
-        if not finite.all():
-            at = int(np.argmin(finite))
-            raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
         parts = breakdown(boom, *states, base=base, payload_as=payload_as, friction=True)
     return loads, parts, base
+
+
+def _finite_loads(
+    boom: Boom, trajectory: Trajectory, base: BaseMotion | None, payload_as: PayloadAs, reactions: bool = True
+) -> Loads:
+    """Loads with friction.
+
+    Raises:
+        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+    """
+    states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    with np.errstate(over="ignore", invalid="ignore"):
+        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True, reactions=reactions)
+    finite = np.isfinite(loads.tau).all(axis=-1)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
+    return loads
 
 
 def _shock(boom: Boom, trajectory: Trajectory, vehicle: VehicleCase, payload_as: PayloadAs) -> Shock:

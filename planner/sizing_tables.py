@@ -7,9 +7,9 @@ from typing import Any
 
 from boom_model import LinearDrive
 from boom_model.drives import STEPPER_MARGIN
-from planner.comparison import comparison_markdown
 from planner.report import cells
 from planner.rows import Row, Verdict
+from planner.side_by_side import comparison_markdown
 from planner.sizing import Choice, Judged
 
 SAVING = ("boom", "joint", "fitted", "lightest without a FAIL", "saves")

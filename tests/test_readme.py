@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, Catalogue, gravity_torque
-from planner.comparison import compared, comparison_markdown
 from planner.missions import check_cycle, load_mission, plan_cycle
+from planner.side_by_side import compared, comparison_markdown
 from planner.sizing import Choice, candidates, fitted, parse_variant, size
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
