@@ -4,7 +4,7 @@ import io
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
@@ -25,8 +25,23 @@ if TYPE_CHECKING:
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _PIPE_WIDTH = 132
+_CATALOGUE = "boom.catalogue"
 
-boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; else the third generation.")
+_boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; else the third generation.")
+_catalogue_option = click.option(
+    "--catalogue",
+    metavar="FILE.toml",
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({_CATALOGUE: value}),
+    help="Motors, gearboxes and actuators of your own, beside the shipped ones.",
+)
+
+
+def boom_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """--boom, and --catalogue, which `_load` finds in the context: whoever names a drive may have brought it."""
+    return _boom_option(_catalogue_option(command))
+
+
 payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; else the boom's own.")
 payload_as_option = click.option(
     "--payload-as", type=click.Choice(["mass", "force"]), default="mass", show_default=True,
@@ -41,6 +56,7 @@ vehicle_option = click.option(
     metavar="CASE",
     help="What the vehicle does meanwhile: slope, track, shock, ditch or a FILE.toml; else it rests.",
 )
+picture_option = click.option("--picture", metavar="FILE.png", help="The drives as a page of pictures.")
 pitch_option = click.option(
     "--pitch",
     default="down",
@@ -114,6 +130,7 @@ def cli() -> None:
 @click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
 @click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
 @report_option
+@picture_option
 @vehicle_option
 @boom_option
 @json_option
@@ -134,6 +151,7 @@ def plan(
     payload: float | None,
     out: str,
     csv_file: str | None,
+    picture: str | None,
     document: str | None,
     vehicle: str | None,
     boom_file: str | None,
@@ -159,7 +177,8 @@ def plan(
 
     boom = _load(boom_file, payload)
     case = None if vehicle is None else load_case(vehicle)
-    check_writable(out, csv_file)
+    _check_picture(picture)
+    check_writable(out, csv_file, picture)
     _require_document(document)
     targets = parse_target(start), parse_target(goal)
     options: dict[str, Any] = {
@@ -196,6 +215,11 @@ def plan(
     if csv_file is not None:
         write_csv(move.trajectory, csv_file, move.loads.tau)
         written["csv"] = csv_file
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        write_drive_picture(picture, boom, move.trajectory, move.loads.tau, report)
+        written["picture"] = picture
     _write_document(document, report, boom, move.trajectory, move.loads.tau, written)
     return _print_report(report, written, as_json)
 
@@ -413,6 +437,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 @vehicle_option
 @click.option("--out", metavar="FILE.rrd", help="A recording of the motion, for `boom view`.")
 @report_option
+@picture_option
 @boom_option
 @json_option
 def check(
@@ -421,6 +446,7 @@ def check(
     payload_as: Any,
     vehicle: str | None,
     out: str | None,
+    picture: str | None,
     document: str | None,
     boom_file: str | None,
     as_json: bool,
@@ -438,7 +464,8 @@ def check(
     from planner.vehicle import load_case
 
     _require_document(document)
-    check_writable(out, document)
+    _check_picture(picture)
+    check_writable(out, document, picture)
     boom, trajectory = _load(boom_file, payload), read_motion(motion)
     case = None if vehicle is None else load_case(vehicle)
     move = examine(boom, trajectory, payload_as=payload_as, vehicle=case)
@@ -450,6 +477,11 @@ def check(
         written["recording"] = out
     if document is not None:
         _write_document(document, move.report, boom, trajectory, move.loads.tau, written)
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        write_drive_picture(picture, boom, trajectory, move.loads.tau, move.report)
+        written["picture"] = picture
     return _print_report(move.report, written, as_json)
 
 
@@ -572,6 +604,148 @@ def compare(
 
 
 @cli.command()
+@click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
+@click.option("--joint", "joints", multiple=True, help="Compare the drive checks of this joint alone; may be given again.")
+@payload_option
+@payload_as_option
+@vehicle_option
+@click.option("--out", metavar="FILE.md", help="The report, or the comparison, as Markdown.")
+@picture_option
+@boom_option
+@json_option
+def mission(
+    missions: tuple[str, ...],
+    joints: tuple[str, ...],
+    payload: float | None,
+    payload_as: Any,
+    vehicle: str | None,
+    out: str | None,
+    picture: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Check a duty cycle of moves, holds and pauses as a whole; several of them side by side.
+
+    MISSION is a FILE.toml, or one of field-day, table-2-4 and table-3-1.
+
+    \b
+    Examples:
+      boom mission field-day --picture drives.png
+      boom mission table-2-4 table-3-1 --joint inner --joint lower
+    """
+    from planner.files import check_writable, write_text
+    from planner.missions import check_cycle, load_mission, plan_cycle
+    from planner.planning import torques
+    from planner.rows import Verdict
+    from planner.side_by_side import compared, comparison_markdown
+    from planner.vehicle import load_case
+
+    boom, case = _load(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    _check_picture(picture)
+    check_writable(out, picture)
+    if picture is not None and len(missions) > 1:
+        raise InputError(f"--picture {picture}: a page shows one mission, and {len(missions)} are given")
+    loaded = [load_mission(name) for name in missions]
+    cycles = {each.name: plan_cycle(boom, each, case) for each in loaded}
+    if len(cycles) < len(missions):
+        raise InputError(f"two missions bear one name: {', '.join(each.name for each in loaded)}")
+    reports = {name: check_cycle(boom, cycle, payload_as=payload_as, vehicle=case) for name, cycle in cycles.items()}
+    written: dict[str, str] = {}
+    header, rows = compared(reports, joints)
+    alone = len(reports) == 1 and not joints
+    if out is not None:
+        text = next(iter(reports.values())).to_markdown() if alone else comparison_markdown(header, rows)
+        write_text(out, text)
+        written["markdown"] = out
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        ((name, cycle),) = cycles.items()
+        tau = torques(boom, cycle.trajectory, payload_as, case)
+        moves = [samples for leg, samples in cycle.slices() if leg.moves]
+        write_drive_picture(picture, boom, cycle.trajectory, tau, reports[name], moves)
+        written["picture"] = picture
+    if alone:
+        return _print_report(next(iter(reports.values())), written, as_json)
+    if as_json:
+        _print_json({"missions": {name: report.to_json({}) for name, report in reports.items()}, "files": written})
+    else:
+        _print_rows(header, rows)
+        for name, report in reports.items():
+            _print_lines(f"{name}", (report.summary,))
+        for kind, name in written.items():
+            click.echo(f"{kind}: {name}")
+    return ANSWER_IS_NO if any(report.verdict is Verdict.FAIL for report in reports.values()) else 0
+
+
+@cli.command()
+@click.argument("mission", default="field-day")
+@click.option("--joint", "joints", multiple=True, help="Size this joint; may be given again; else every one.")
+@click.option("--voltage", "voltages", type=float, multiple=True, metavar="V", help="Bus voltage to try; may be given again.")
+@click.option(
+    "--adapt", type=click.Choice(["nothing", "rescale", "replan"]), default="nothing", show_default=True,
+    help="What may change to suit a drive: the moves slowed evenly, or planned anew.",
+)  # fmt: skip
+@click.option(
+    "--variant", "variants", multiple=True, metavar="BODY=KG,...",
+    help="A boom of other masses beside the given one, payload=KG among them; may be given again.",
+)  # fmt: skip
+@payload_option
+@payload_as_option
+@click.option("--out", metavar="FILE.md", help="The tables as Markdown.")
+@boom_option
+@json_option
+def size(
+    mission: str,
+    joints: tuple[str, ...],
+    voltages: tuple[float, ...],
+    adapt: str,
+    variants: tuple[str, ...],
+    payload: float | None,
+    payload_as: Any,
+    out: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Go through the catalogue for each joint: what does not fail, ranked by mass and margin, and why the rest does.
+
+    \b
+    Example:
+      boom size field-day --variant inner=5.55 --variant payload=5
+    """
+    from boom_model import JOINTS, Catalogue
+    from planner.files import check_writable, write_text
+    from planner.missions import load_mission, plan_cycle
+    from planner.sizing import Adapt, choose, parse_variant
+    from planner.sizing_tables import SAVING, motors, ranking, saving, sizing_json, sizing_markdown, sizing_notes
+
+    boom = _load(boom_file, payload)
+    check_writable(out)
+    catalogue = Catalogue.load().with_file(click.get_current_context().meta.get(_CATALOGUE))
+    booms = {"as it is": boom} | {text: parse_variant(boom, text) for text in variants}
+    cycle = plan_cycle(boom, load_mission(mission))
+    choices = choose(booms, cycle, joints or JOINTS, catalogue, voltages, Adapt(adapt), payload_as)
+    notes, written = sizing_notes(choices), {} if out is None else {"markdown": out}
+    if out is not None:
+        write_text(out, sizing_markdown(f"Drives for the mission {cycle.mission.name}", choices, notes))
+    if as_json:
+        _print_json(sizing_json(cycle.mission.name, choices, notes) | {"files": written})
+    else:
+        for choice in (choice for choice in choices if choice.judged):
+            click.echo(f"{choice.joint}, {choice.variant}")
+            _print_rows(*ranking(choice))
+            _print_lines("All are warned of", choice.warned)
+        click.echo("Each drive in its best supply")
+        _print_rows(*motors(choices))
+        click.echo("What the lightest saves")
+        _print_rows(SAVING, saving(choices))
+        _print_lines("Note", notes)
+        for kind, name in written.items():
+            click.echo(f"{kind}: {name}")
+    return ANSWER_IS_NO if any(choice.judged and choice.lightest is None for choice in choices) else 0
+
+
+@cli.command()
 @json_option
 def validate(as_json: bool) -> int:
     """The thesis's tables 2-5 to 2-8 and section 3.5's loads, row by row, against this model."""
@@ -600,8 +774,13 @@ def view(recording: str) -> int:
 
 
 def _load(boom_file: str | None, payload: float | None = None) -> Boom:
-    boom = Boom.load(boom_file)
+    boom = Boom.load(boom_file, click.get_current_context().meta.get(_CATALOGUE))
     return boom if payload is None else boom.with_payload(payload)
+
+
+def _check_picture(picture: str | None) -> None:
+    if picture is not None and not picture.endswith(".png"):
+        raise InputError(f"{picture}: the drives' page is written as .png")
 
 
 def _print_comparison(answer: dict[str, Any]) -> None:
@@ -661,6 +840,16 @@ def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> i
     return ANSWER_IS_NO if report.verdict is Verdict.FAIL else 0
 
 
+_STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta", "INFO": "dim"}
+
+
+def _print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    table = _table(*header)
+    for row in rows:
+        table.add_row(*row)
+    _console().print(table)
+
+
 def _require_document(path: str | None) -> None:
     from planner.document import require_form
     from planner.files import check_writable
@@ -674,14 +863,13 @@ def _write_document(
     path: str | None, report: "Report", boom: Boom, motion: "Trajectory", tau: "Array", written: dict[str, str]
 ) -> None:
     from planner.document import write_document
+    from planner.drive_pictures import drive_figure
     from planner.move_pictures import move_pictures
 
     if path is not None:
-        write_document(path, report.to_markdown(), move_pictures(boom, motion, tau))
+        drives = {"Drives": drive_figure(boom, motion, tau, report)} if any(boom.drives) else {}
+        write_document(path, report.to_markdown(), move_pictures(boom, motion, tau) | drives)
         written["report"] = path
-
-
-_STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta"}
 
 
 def _print_lines(title: str | None, lines: Iterable[str]) -> None:

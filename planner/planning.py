@@ -21,7 +21,9 @@ from boom_model.arrays import Array, checked
 from boom_model.dynamics import PayloadAs
 from boom_model.holds import Hold
 from planner.certificate import certify
-from planner.checks import Shock, check_rows
+from planner.checks import check_rows
+from planner.duty import Duty
+from planner.joint_view import Shock
 from planner.legs import Along, legs
 from planner.report import Report, assumptions, torque_peaks
 from planner.stopping import worst_stop
@@ -132,6 +134,7 @@ def check(
     payload_as: PayloadAs = "mass",
     vehicle: VehicleCase | None = None,
     profile: str = "recorded",
+    duty: Duty | None = None,
 ) -> Report:
     """The limit and drive checks of any motion, at its samples, with the joints' friction where it is known.
 
@@ -139,8 +142,9 @@ def check(
         payload_as: see `inverse_dynamics`.
         vehicle: what the vehicle does meanwhile; None rests on level ground.
         profile: what the report calls the motion.
+        duty: the cycle that the samples stand for; None is the motion alone.
     """
-    return examine(boom, trajectory, payload_as=payload_as, vehicle=vehicle, profile=profile).report
+    return examine(boom, trajectory, payload_as=payload_as, vehicle=vehicle, profile=profile, duty=duty).report
 
 
 def examine(
@@ -150,13 +154,14 @@ def examine(
     payload_as: PayloadAs = "mass",
     vehicle: VehicleCase | None = None,
     profile: str = "recorded",
+    duty: Duty | None = None,
 ) -> Move:
     """Any motion with its loads and its checks, as `write_recording` takes it; for the arguments see `check`."""
     loads, parts, base = _loads(boom, trajectory, vehicle, payload_as)
     shock = None if vehicle is None or vehicle.peak == 0.0 else _shock(boom, trajectory, vehicle, payload_as)
     report = Report(
         profile=str(profile),
-        duration=trajectory.duration,
+        duration=trajectory.duration if duty is None else duty.duration,
         rows=check_rows(
             boom,
             trajectory,
@@ -165,6 +170,7 @@ def examine(
             payload_as=payload_as,
             shock=shock,
             bases=() if vehicle is None else (vehicle.origin.basis,),
+            duty=duty,
         ),
         notes=(*trajectory.notes, *_vehicle_notes(vehicle)),
         assumptions=assumptions(boom, trajectory.qddd is not None),
@@ -221,9 +227,10 @@ def _shock(boom: Boom, trajectory: Trajectory, vehicle: VehicleCase, payload_as:
     """What the joints bear without the shock, and whether the samples see it."""
     calm, _, _ = _loads(boom, trajectory, replace(vehicle, peak=0.0), payload_as)
     start, end = vehicle.shock_start, vehicle.shock_start + vehicle.shock_duration
-    inside = trajectory.t[0] <= start and end <= trajectory.t[-1]
-    samples = int(((trajectory.t >= start) & (trajectory.t <= end)).sum())
-    return Shock(calm.tau, inside and samples >= SHOCK_SAMPLES)
+    whole = trajectory.t[0] <= start and end <= trajectory.t[-1]
+    inside = (trajectory.t >= start) & (trajectory.t <= end)
+    resolved = bool(whole and inside.sum() >= SHOCK_SAMPLES)
+    return Shock(calm.tau, resolved, inside, vehicle.shock_duration, vehicle.shock_events)
 
 
 def _move(

@@ -6,6 +6,10 @@
     /world/boom/<body>        its pose (frame "<body>" in "mount") over time, and its solid; likewise /world/boom/tip
     /plots/<quantity>/<joint> q, qd, qdd, tau over time, in deg and m, Nm and N; /plots/q/linkage is theta3 - theta2
     /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle, which add up to tau
+    /plots/motor/<joint>      motor torque, what the torque-speed curve leaves, and that with the stepper's margin [Nm]
+    /plots/gearbox/<joint>    gearbox torque and its ratings [Nm]
+    /plots/tip/deflection     what the drives let the tip deflect, in parts and in all [mm]
+    /drives                   the page of `drive_pictures`, where a joint has a motor
     /plots/mount/force, moment   of the boom on the mount, along frame 1 [N, Nm]
     .../limits                the limits beside it; those that do not change with the motion at the move's two ends only
     /report                   the report as Markdown
@@ -25,14 +29,15 @@ import rerun as rr
 import rerun.blueprint as rrb
 from scipy.spatial.transform import Rotation
 
-from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms, forward_kinematics
+from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms, forward_kinematics, tip_deflection
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
-from boom_model.drives import drive_inertia, drive_torque_limit
+from boom_model.drives import STEPPER_MARGIN, available_torque, drive_inertia, drive_torque_limit, motor_torque
 from boom_model.frames import R_LINK_BODY, frame_transforms
 from boom_model.keep_out import Box, KeepOut
 from boom_model.reach import ReachMap
 from planner.comparison import Comparison
+from planner.drive_pictures import drive_picture
 from planner.files import replacing
 from planner.planning import Move
 from planner.reach_picture import margin_colors, margin_range, reach_title, reference_pose
@@ -85,6 +90,9 @@ def write_recording(path: str | Path, move: Move) -> None:
             _log_plot(recording, trajectory.t, plot)
         for bundle in (bundle for tab in bundles.values() for bundle in tab):
             _log_bundle(recording, trajectory.t, bundle)
+        if bundles.get("Drives"):
+            page = rr.EncodedImage(contents=drive_picture(boom, trajectory, loads.tau, report), media_type="image/png")
+            recording.log("drives", page, static=True)
 
     with replacing(path) as temporary:
         Path(temporary).write_bytes(_encoded(f"{boom.name}: {report.profile}, {report.duration:.3f} s", log))
@@ -467,7 +475,48 @@ def _bundles(move: Move) -> dict[str, list[_Bundle]]:
             title = f"{kind} on the mount [{unit}]"
             curves = [f"{name} [{unit}]" for name in names]
             tabs["Mount"].append(_Bundle(f"plots/mount/{kind}", title, curves, colors, np.stack(series, axis=-1)))
+    if drives := list(_drive_bundles(move)):
+        tabs["Drives"] = [*drives, _tip_bundle(move)]
     return tabs
+
+
+def _drive_bundles(move: Move) -> Iterator[_Bundle]:
+    """Each motor's torque beside its curve, and its gearbox's beside its ratings, all as sizes."""
+    motion, tau = move.trajectory, np.abs(move.loads.tau)
+    for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
+        if drive is None:
+            continue
+        gear = drive.gearbox
+        torque = motor_torque(drive, move.loads.tau[:, i], motion.qd[:, i], motion.qdd[:, i])
+        curve = available_torque(drive, gear.ratio * motion.qd[:, i])
+        if torque is not None and curve is not None:
+            basis = Basis.weakest([Basis.ESTIMATED, *(origin.basis for origin in drive.supply_origins)])
+            names = ["torque [Nm]", f"available ({basis}) [Nm]", f"with {STEPPER_MARGIN:.0%} margin ({basis}) [Nm]"]
+            values = np.stack([np.abs(torque), curve, curve / (1.0 + STEPPER_MARGIN)], axis=-1)
+            colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, LIMIT_COLOR]
+            yield _Bundle(f"plots/motor/{joint}", f"{joint}, {drive.motor.name} [Nm]", names, colors, values)
+        ratings = {
+            "rated": gear.continuous_torque,
+            "largest average": gear.max_average_torque,
+            "start-stop": gear.start_stop_torque,
+        }
+        known = {name: value for name, value in ratings.items() if value is not None}
+        names = ["torque [Nm]", *(f"{name} [Nm]" for name in known)]
+        values = np.stack([tau[:, i], *(np.full(len(tau), value) for value in known.values())], axis=-1)
+        colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, COLORS["upper"], LIMIT_COLOR]
+        yield _Bundle(f"plots/gearbox/{joint}", f"{joint}, {gear.name} [Nm]", names, colors[: len(names)], values)
+
+
+def _tip_bundle(move: Move) -> _Bundle:
+    """The error budget of the tip [mm]."""
+    budget = tip_deflection(move.boom, move.trajectory.q, move.loads.tau)
+    parts = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
+    names = [f"{name} [mm]" for name in ("wind-up", "hysteresis", "backlash", "step error", "in all")]
+    colors = [COLORS[b] for b in ("inner", "upper", "outer", "end_effector")]
+    values = np.stack(parts, axis=-1) * 1e3
+    return _Bundle(
+        "plots/tip/deflection", "tip's deflection by the drives, at most [mm]", names, [*colors, PAYLOAD_COLOR], values
+    )
 
 
 _COMPARISON_LEGEND = "Solid bodies and the light path: measured. Edges and the orange path: planned."
@@ -510,10 +559,14 @@ def _log_bundle(recording: rr.RecordingStream, t: Array, bundle: _Bundle) -> Non
 def _blueprint(
     eye: rrb.EyeControls3D, plots: Mapping[str, Sequence[_Plot]], bundles: Mapping[str, Sequence[_Bundle]]
 ) -> rrb.Blueprint:
-    tabs = [rrb.Grid(*(_plot_view(plot) for plot in tab), grid_columns=2, name=name) for name, tab in plots.items()]
+    tabs: list[rrb.View | rrb.Container] = [
+        rrb.Grid(*(_plot_view(plot) for plot in tab), grid_columns=2, name=name) for name, tab in plots.items()
+    ]
     for name, tab in bundles.items():
         views = [rrb.TimeSeriesView(origin=f"/{bundle.entity}", name=bundle.title) for bundle in tab]
         tabs.append(rrb.Grid(*views, grid_columns=2 if len(views) > 2 else 1, name=name))
+    if bundles.get("Drives"):
+        tabs.append(rrb.Spatial2DView(origin="/drives", name="Drives' page"))
     report = rrb.TextDocumentView(origin="/report", name="Report")
     boom = rrb.Spatial3DView(origin="/world", name="Boom [m]", eye_controls=eye)
     return _shown_beside(boom, rrb.Tabs(*tabs, report, active_tab=0), [1, 1])
