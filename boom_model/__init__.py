@@ -4,7 +4,7 @@ profiles, screens or files, its own TOML aside."""
 from boom_model.base_motion import BaseMotion, up_on_slope
 from boom_model.boom import JOINTS, Body, Boom, Friction, Geometry, Limits, Mount
 from boom_model.catalogue import Catalogue
-from boom_model.drives import Drive, Gearbox, Motor, Winding, Wiring
+from boom_model.drives import Drive, Gearbox, Motor, Winding, Wiring, mesh_efficiency
 from boom_model.dynamics import Loads, PinForces, inner_link_load, inverse_dynamics
 from boom_model.equations_of_motion import (
     forward_dynamics,
@@ -16,6 +16,7 @@ from boom_model.equations_of_motion import (
 )
 from boom_model.errors import BoomError, InfeasibleError, InputError
 from boom_model.frames import body_transforms, dh_rows, frame_transforms
+from boom_model.gear_compliance import TipDeflection, gear_frequencies, tip_deflection, wind_up
 from boom_model.holds import (
     ActuatorAngle,
     ActuatorHorizontal,
@@ -49,6 +50,7 @@ from boom_model.kinematics import (
     manipulability,
     transmission_angle,
 )
+from boom_model.linear_actuator import LinearActuator, LinearDrive, screw_torque
 from boom_model.provenance import Basis, Origin, Sourced
 from boom_model.reach import NearestReachable, ReachMap, nearest_reachable, reach_map
 from boom_model.torque_breakdown import Breakdown, breakdown
@@ -81,6 +83,8 @@ __all__ = [
     "LeastExtension",
     "LeastTorque",
     "Limits",
+    "LinearActuator",
+    "LinearDrive",
     "Loads",
     "Motor",
     "Mount",
@@ -93,6 +97,7 @@ __all__ = [
     "Solution",
     "Solutions",
     "Sourced",
+    "TipDeflection",
     "TipPose",
     "Winding",
     "Wiring",
@@ -104,6 +109,7 @@ __all__ = [
     "forward_kinematics",
     "frame_motion",
     "frame_transforms",
+    "gear_frequencies",
     "gravity_torque",
     "inner_link_load",
     "inverse_dynamics",
@@ -114,11 +120,15 @@ __all__ = [
     "kinetic_energy",
     "manipulability",
     "mass_matrix",
+    "mesh_efficiency",
     "nearest_reachable",
     "potential_energy",
     "reach_map",
+    "screw_torque",
     "solve_branches",
+    "tip_deflection",
     "transmission_angle",
     "up_on_slope",
     "velocity_torque",
+    "wind_up",
 ]

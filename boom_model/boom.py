@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.drives import Drive
 from boom_model.errors import InputError
 from boom_model.keep_out import KeepOut
+from boom_model.linear_actuator import LinearDrive
 from boom_model.provenance import Origin, Sourced
 
 JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
@@ -149,6 +151,8 @@ class Boom:
     mount: Mount
     gravity: float = 9.81
     """[m/s^2]"""
+    actuator: LinearDrive | None = None
+    """Linear actuator of the extension; None where none is given, as for drives."""
     keep_out: KeepOut | None = None
     """What the arm must keep away from; None where nobody says."""
 
@@ -158,7 +162,7 @@ class Boom:
 
         Args:
             path: a boom's TOML file; None is the shipped `boom_model/data/third_generation.toml`.
-            catalogue: the TOML file its drives are named in; None is the shipped one.
+            catalogue: a TOML file of drives of the user's own, beside the shipped ones.
 
         Raises:
             InputError: the file cannot be read, is malformed, or names unknown keys or drives; the key is named.
@@ -179,6 +183,22 @@ class Boom:
         old = self.payload
         inertia = old.inertia * (mass / old.mass) if old.mass > 0.0 else old.inertia
         return replace(self, payload=Body(mass, old.com, read_only(inertia)))
+
+    def with_body_mass(self, name: str, mass: float) -> "Boom":
+        """The same boom with a body of another mass [kg]: same centre of mass, inertia in proportion.
+
+        Raises:
+            InputError: no such body, a mass that is not finite or negative, or a body without mass to scale.
+        """
+        if name not in self.bodies:
+            raise InputError(f"unknown body {name!r}; there are: {', '.join(self.bodies)}")
+        mass, old = scalar(f"mass of {name}", mass), self.bodies[name]
+        if mass < 0.0 or old.mass == 0.0:
+            raise InputError(
+                f"mass of {name} is {mass:g} kg, from {old.mass:g} kg; the one must not be negative, the other not 0"
+            )
+        changed = Body(mass, old.com, read_only(old.inertia * (mass / old.mass)))
+        return replace(self, bodies=MappingProxyType({**self.bodies, name: changed}))
 
     def pose(self, name: str) -> Array:
         """The named pose, (5,).

@@ -1,5 +1,6 @@
 """The TOML form of a boom: schema, validation, and conversion to SI."""
 
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +15,7 @@ from boom_model.catalogue import CATALOGUE_FILE, Catalogue
 from boom_model.drives import Drive, Wiring
 from boom_model.errors import InputError
 from boom_model.keep_out import Box, Capsule, KeepOut
+from boom_model.linear_actuator import LinearDrive
 from boom_model.provenance import Basis, Origin, Sourced
 from boom_model.toml_file import Finite, NonNegative, Positive, Table, read_toml
 
@@ -94,6 +96,11 @@ class _DriveTable(Table):
     brake: _Sourced[bool] | None = None
 
 
+class _ActuatorTable(Table):
+    model: str
+    brake: _Sourced[bool] | None = None
+
+
 class _RevoluteFriction(_Origin):
     viscous_Nm_s_per_rad: NonNegative
     coulomb_Nm: NonNegative
@@ -134,6 +141,7 @@ class _PrismaticTable(Table):
     acceleration_m_s2: _Sourced[Positive]
     jerk_m_s3: _Sourced[Positive]
     friction: _PrismaticFriction | None = None
+    actuator: _ActuatorTable | None = None
 
     @property
     def rows(self) -> tuple[_Range, _Sourced[float], _Sourced[float], _Sourced[float], float]:
@@ -230,7 +238,7 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
     """See `Boom.load`."""
     file = Path(path) if path is not None else BOOM_FILE
     table = read_toml(file, _BoomTable)
-    known = Catalogue.load(catalogue)
+    known = Catalogue.load().with_file(catalogue)
     joints = [getattr(table.joints, joint) for joint in JOINTS]
     g = table.geometry
     return Boom(
@@ -246,6 +254,7 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
             _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), known, catalogue)
             for name, joint in zip(JOINTS, joints, strict=True)
         ),
+        actuator=_linear_drive(file, table.joints.extension.actuator, known, catalogue),
         poses=MappingProxyType({name: _pose(pose) for name, pose in table.poses.items()}),
         keep_out=None if table.keep_out is None else _keep_out(table.keep_out),
     )
@@ -296,9 +305,7 @@ def _drive(file: Path, key: str, table: _DriveTable | None, known: Catalogue, ca
     if table is None:
         return None
     for kind, name, entries in (("motor", table.motor, known.motors), ("gearbox", table.gearbox, known.gearboxes)):
-        if name not in entries:
-            listed = ", ".join(entries) or "none"
-            raise InputError(f"{file}: key {key}.{kind}: {name!r} is not in {catalogue or CATALOGUE_FILE.name} ({listed})")
+        _complain_unless_known(f"{file}: key {key}.{kind}", name, entries, catalogue)
     motor = known.motors[table.motor]
     voltage = table.bus_voltage_V
     if voltage is not None and motor.max_voltage is not None and voltage.value > motor.max_voltage:
@@ -313,6 +320,21 @@ def _drive(file: Path, key: str, table: _DriveTable | None, known: Catalogue, ca
         wiring=None if wiring is None else Sourced(Wiring(wiring.value), wiring.origin),
         brake=_given(table.brake),
     )
+
+
+def _linear_drive(
+    file: Path, table: _ActuatorTable | None, known: Catalogue, catalogue: str | Path | None
+) -> LinearDrive | None:
+    if table is None:
+        return None
+    _complain_unless_known(f"{file}: key joints.extension.actuator.model", table.model, known.actuators, catalogue)
+    return LinearDrive(known.actuators[table.model], _given(table.brake))
+
+
+def _complain_unless_known(where: str, name: str, entries: Mapping[str, object], catalogue: str | Path | None) -> None:
+    if name not in entries:
+        searched = CATALOGUE_FILE.name if catalogue is None else f"{CATALOGUE_FILE.name} or {catalogue}"
+        raise InputError(f"{where}: {name!r} is not in {searched} ({', '.join(entries) or 'none'})")
 
 
 def _pose(table: _PoseTable) -> Array:

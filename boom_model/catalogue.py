@@ -1,7 +1,7 @@
-"""The catalogue of motors and gearboxes: a TOML file in the datasheets' units, read into SI."""
+"""The catalogue of motors, gearboxes and linear actuators: a TOML file in the datasheets' units, read into SI."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
@@ -11,17 +11,22 @@ import numpy as np
 from pydantic import Field
 
 from boom_model.drives import Gearbox, Motor, Winding
-from boom_model.toml_file import Positive, Table, read_toml
+from boom_model.errors import InputError
+from boom_model.linear_actuator import LinearActuator
+from boom_model.toml_file import Finite, Positive, Table, read_toml
 
 CATALOGUE_FILE = Path(str(files("boom_model") / "data" / "catalogue.toml"))
+
+_RPM = 2.0 * np.pi / 60.0
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """Motors and gearboxes by model name."""
+    """Motors, gearboxes and linear actuators by model name."""
 
     motors: Mapping[str, Motor]
     gearboxes: Mapping[str, Gearbox]
+    actuators: Mapping[str, LinearActuator]
 
     @staticmethod
     def load(path: str | Path | None = None) -> "Catalogue":
@@ -34,23 +39,49 @@ class Catalogue:
         return Catalogue(
             motors=MappingProxyType({name: _motor(name, t) for name, t in table.motors.items()}),
             gearboxes=MappingProxyType({name: _gearbox(name, t) for name, t in table.gearboxes.items()}),
+            actuators=MappingProxyType({name: _actuator(name, t) for name, t in table.actuators.items()}),
         )
+
+    def with_file(self, path: str | Path | None) -> "Catalogue":
+        """This catalogue and the entries of another file; None adds nothing.
+
+        Raises:
+            InputError: as `load`, or an entry of the file bears a name that is taken; names the file and the entry.
+        """
+        if path is None:
+            return self
+        own = Catalogue.load(path)
+        for field in fields(self):
+            for name in getattr(own, field.name):
+                if name in getattr(self, field.name):
+                    raise InputError(f"{path}: key {field.name}.{name}: the name is taken by an entry that is known already")
+        return Catalogue(**{f.name: MappingProxyType({**getattr(self, f.name), **getattr(own, f.name)}) for f in fields(self)})
 
 
 class _WindingTable(Table):
     current_A: Positive
     resistance_ohm: Positive
     inductance_mH: Positive
+    voltage_V: Positive | None = None
 
 
 class _MotorTable(Table):
+    """What no check uses (phase voltage, temperatures, shaft loads) stands in the file for its readers."""
+
     source: str
+    tolerance_percent: Positive | None = None
     step_deg: Positive
+    full_step_accuracy_deg: Positive | None = None
+    microstep_accuracy_deg: Positive | None = None
     max_voltage_V: Positive | None = None
     holding_torque_Nm: Positive | None = None
     running_torque_Nm: Positive | None = None
     mass_kg: Positive | None = None
     rotor_inertia_kg_cm2: Positive | None = None
+    ambient_degC: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
+    max_operating_degC: Finite | None = None
+    max_radial_load_kg: Positive | None = None
+    max_thrust_load_kg: Positive | None = None
     parallel: _WindingTable | None = None
     series: _WindingTable | None = None
 
@@ -76,11 +107,29 @@ class _GearboxTable(Table):
     backlash_mrad: Positive | None = None
     hysteresis_mrad: Positive | None = None
     max_input_speed_rpm: Positive | None = None
+    max_average_input_speed_rpm: Positive | None = None
+    rated_life_h: Positive | None = None
+    rated_input_speed_rpm: Positive | None = None
+
+
+class _ActuatorTable(Table):
+    source: str
+    rated_force_N: Positive | None = None
+    peak_force_N: Positive | None = None
+    static_force_N: Positive | None = None
+    max_speed_m_s: Positive | None = None
+    stroke_m: Positive | None = None
+    lead_mm: Positive | None = None
+    efficiency_percent: Annotated[float, Field(gt=0, le=100)] | None = None
+    backdrive_force_N: Positive | None = None
+    duty_percent: Annotated[float, Field(gt=0, le=100)] | None = None
+    mass_kg: Positive | None = None
 
 
 class _CatalogueTable(Table):
     motors: dict[str, _MotorTable] = Field(default_factory=dict)
     gearboxes: dict[str, _GearboxTable] = Field(default_factory=dict)
+    actuators: dict[str, _ActuatorTable] = Field(default_factory=dict)
 
 
 def _scaled(value: float | None, factor: float) -> float | None:
@@ -105,6 +154,8 @@ def _motor(name: str, t: _MotorTable) -> Motor:
         rotor_inertia=_scaled(t.rotor_inertia_kg_cm2, 1e-4),
         parallel=_winding(t.parallel),
         series=_winding(t.series),
+        microstep_accuracy=_scaled(t.microstep_accuracy_deg, np.pi / 180.0),
+        tolerance=_scaled(t.tolerance_percent, 0.01),
     )
 
 
@@ -129,5 +180,25 @@ def _gearbox(name: str, t: _GearboxTable) -> Gearbox:
         torsion_stiffness=None if None in stiffness else stiffness,  # type: ignore[arg-type]
         backlash=_scaled(t.backlash_mrad, 1e-3),
         hysteresis=_scaled(t.hysteresis_mrad, 1e-3),
-        max_input_speed=_scaled(t.max_input_speed_rpm, 2.0 * np.pi / 60.0),
+        max_input_speed=_scaled(t.max_input_speed_rpm, _RPM),
+        max_average_input_speed=_scaled(t.max_average_input_speed_rpm, _RPM),
+        rated_life=_scaled(t.rated_life_h, 3600.0),
+        rated_input_speed=_scaled(t.rated_input_speed_rpm, _RPM),
+    )
+
+
+def _actuator(name: str, t: _ActuatorTable) -> LinearActuator:
+    return LinearActuator(
+        name=name,
+        source=t.source,
+        rated_force=t.rated_force_N,
+        peak_force=t.peak_force_N,
+        static_force=t.static_force_N,
+        max_speed=t.max_speed_m_s,
+        stroke=t.stroke_m,
+        lead=_scaled(t.lead_mm, 1e-3),
+        efficiency=_scaled(t.efficiency_percent, 0.01),
+        backdrive_force=t.backdrive_force_N,
+        duty=_scaled(t.duty_percent, 0.01),
+        mass=t.mass_kg,
     )

@@ -50,6 +50,10 @@ class Motor:
     """[kg m^2]"""
     parallel: Winding | None
     series: Winding | None
+    microstep_accuracy: float | None
+    """Largest error of a microstep without load [rad]."""
+    tolerance: float | None
+    """Share by which a motor may differ from its sheet."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +84,12 @@ class Gearbox:
     hysteresis: float | None
     """[rad]"""
     max_input_speed: float | None
+    """[rad/s] at the input."""
+    max_average_input_speed: float | None
+    """[rad/s] at the input."""
+    rated_life: float | None
+    """L50, which half of them reach at continuous torque and rated input speed [s]."""
+    rated_input_speed: float | None
     """[rad/s] at the input."""
 
 
@@ -169,22 +179,40 @@ def _curve_terms(drive: Drive) -> tuple[float, float, float, float] | None:
     )
 
 
-def motor_torque(drive: Drive, tau: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array | None:
+def mesh_efficiency(gearbox: Gearbox) -> float | None:
+    """Efficiency of the mesh alone, if the printed one already contains the no-load torque at rated torque.
+
+        eta_mesh = (T_rated / N) / (T_rated / (N eta) - T_noload)
+
+    so that T_rated / (N eta_mesh) + T_noload = T_rated / (N eta). None where a figure is missing, or no mesh is that good.
+    """
+    rated, eta, no_load = gearbox.continuous_torque, gearbox.efficiency, gearbox.no_load_input_torque
+    if rated is None or eta is None or no_load is None:
+        return None
+    left = rated / (gearbox.ratio * eta) - no_load
+    mesh = rated / gearbox.ratio / left if left > 0.0 else np.inf
+    return mesh if mesh <= 1.0 else None
+
+
+def motor_torque(
+    drive: Drive, tau: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, no_load_in_efficiency: bool = False
+) -> Array | None:
     """Torque at the motor [Nm] for joint torque `tau` [Nm] at `qd` [rad/s] and `qdd` [rad/s^2]; signed like `tau`.
 
         driving (tau qd > 0):  tau / (N eta) + sign(qd) T_noload + (J_rotor + J_gear) N qdd
         braking or holding:    tau / N                           + (J_rotor + J_gear) N qdd
 
-    The no-load torque is added to the efficiency's loss, the conservative reading of the sheet; friction earns no credit
-    while braking (our own derivation, in the manner of Harmonic Drive's selection pages). About tau = 0 it jumps by T_noload.
-    None where a figure is missing.
+    The no-load torque is added to the efficiency's loss, the conservative reading of the sheet; with `no_load_in_efficiency`
+    eta is `mesh_efficiency`, the other reading. Friction earns no credit while braking (our own derivation, in the manner of
+    Harmonic Drive's selection pages). About tau = 0 it jumps by T_noload. None where a figure is missing.
     """
     gear, inertia = drive.gearbox, reflected_inertia(drive)
-    if gear.efficiency is None or gear.no_load_input_torque is None or inertia is None:
+    efficiency = mesh_efficiency(gear) if no_load_in_efficiency else gear.efficiency
+    if efficiency is None or gear.no_load_input_torque is None or inertia is None:
         return None
     tau, qd, qdd = (np.asarray(x, dtype=float) for x in (tau, qd, qdd))
     driving = tau * qd > 0.0
-    loss = np.where(driving, tau * (1.0 / gear.efficiency - 1.0) / gear.ratio, 0.0)
+    loss = np.where(driving, tau * (1.0 / efficiency - 1.0) / gear.ratio, 0.0)
     drag = np.where(driving, np.sign(qd) * gear.no_load_input_torque, 0.0)
     torque: Array = tau / gear.ratio + loss + drag + inertia / gear.ratio * qdd
     return torque

@@ -97,6 +97,11 @@ def inverse_dynamics(
 
     Raises:
         InputError: an input is not finite or of the wrong shape, or shapes do not match.
+
+    >>> boom = Boom.load()
+    >>> loads = inverse_dynamics(boom, boom.pose("phenotyping"), np.zeros(5), np.zeros(5))
+    >>> [round(float(x), 1) + 0.0 for x in loads.tau]
+    [0.0, 110.2, 200.3, 0.0, 0.0]
     """
     if payload_as not in ("mass", "force"):
         raise InputError(f"payload_as is {payload_as!r}; it must be 'mass' or 'force'")

@@ -15,6 +15,9 @@ from boom_model.boom import Boom
 
 Loop = Literal["inner", "outer"]
 
+_CHUNK = 1024
+"""States at once, whose working arrays stay in the processor's cache."""
+
 BODY_FRAMES: dict[str, tuple[Loop, int]] = {
     "base": ("outer", 2),
     "lower": ("outer", 5),
@@ -95,18 +98,28 @@ def frame_transforms(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
     Raises:
         InputError: q is not finite or not (..., 5).
     """
-    alpha, a, d, theta = np.moveaxis(dh_rows(boom, q, loop), -1, 0)
+    q = checked("q", q, 5)
+    states = q.reshape(-1, 5)
+    T = np.empty((len(states), 11, 4, 4))
+    T[:, 0] = np.eye(4)
+    for start in range(0, len(states), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        steps = _steps(dh_rows(boom, states[part], loop))
+        for i in range(10):
+            np.matmul(T[part, i], steps[:, i], out=T[part, i + 1])
+    return T.reshape(*q.shape[:-1], 11, 4, 4)
+
+
+def _steps(rows: Array) -> Array:
+    """T_i_i+1 of DH rows (n, 10, 4), (n, 10, 4, 4)."""
+    alpha, a, d, theta = np.moveaxis(rows, -1, 0)
     ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
     steps = np.zeros((*theta.shape, 4, 4))
     steps[..., 0, :] = np.stack([ct, -st, np.zeros_like(ct), a], axis=-1)
     steps[..., 1, :] = np.stack([st * ca, ct * ca, -sa, -sa * d], axis=-1)
     steps[..., 2, :] = np.stack([st * sa, ct * sa, ca, ca * d], axis=-1)
     steps[..., 3, 3] = 1.0
-    T = np.empty((*theta.shape[:-1], 11, 4, 4))
-    T[..., 0, :, :] = np.eye(4)
-    for i in range(10):
-        T[..., i + 1, :, :] = T[..., i, :, :] @ steps[..., i, :, :]
-    return T
+    return steps
 
 
 def body_transforms(boom: Boom, q: ArrayLike) -> dict[str, Array]:

@@ -78,6 +78,10 @@ def inverse_kinematics(
 
     Raises:
         InputError: an input is not finite or of the wrong shape. An unreachable target is no error: no solutions.
+
+    >>> found = inverse_kinematics(Boom.load(), (1.4, 0.0, 1.0))
+    >>> len(found.solutions), [round(float(x), 3) for x in found.solutions[found.best].q]
+    (4, [0.0, 1.093, 3.142, 0.15, 0.0])
     """
     hold = ActuatorHorizontal() if hold is None else hold
     position = checked("position", position)

@@ -38,6 +38,10 @@ def forward_kinematics(boom: Boom, q: ArrayLike) -> TipPose:
 
     Raises:
         InputError: q is not finite or not (..., 5).
+
+    >>> boom = Boom.load()
+    >>> [round(float(x), 3) for x in forward_kinematics(boom, boom.pose("phenotyping")).position]
+    [0.0, 2.29, 0.978]
     """
     q = checked("q", q, 5)
     r, z = _tip_in_plane(boom, q)

@@ -1,11 +1,17 @@
 """From targets to motions that have been checked, and to what people keep of them: reports, recordings, CSV."""
 
 from planner.certificate import Certificate, WorstRatio, certify
-from planner.checks import Row, Verdict, average_torque
+from planner.checks import average_torque
+from planner.comparison import Comparison, Log, compare, read_log
 from planner.constraints import InfeasiblePathError
+from planner.missions import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
+from planner.model_export import mjcf, urdf, write_model
+from planner.motion_files import read_motion, write_motion
 from planner.path import JointLine, Path
-from planner.planning import Move, check, plan
+from planner.planning import Move, check, examine, plan, torques
 from planner.report import Report
+from planner.rows import Row, Verdict
+from planner.sizing import Adapt, Choice, Judged, candidates, choose, size
 from planner.stopping import Stop, WorstStop, stop
 from planner.targets import TipTarget, parse_hold, parse_pitch, parse_target
 from planner.time_law import Motion, TimeLaw
@@ -13,9 +19,17 @@ from planner.timing import Profile
 from planner.trajectory import Trajectory, read_csv, sample, write_csv
 
 __all__ = [
+    "Adapt",
     "Certificate",
+    "Choice",
+    "Comparison",
+    "Cycle",
     "InfeasiblePathError",
     "JointLine",
+    "Judged",
+    "Leg",
+    "Log",
+    "Mission",
     "Motion",
     "Move",
     "Path",
@@ -30,14 +44,29 @@ __all__ = [
     "WorstRatio",
     "WorstStop",
     "average_torque",
+    "candidates",
     "certify",
     "check",
+    "check_cycle",
+    "choose",
+    "compare",
+    "examine",
+    "load_mission",
+    "mjcf",
     "parse_hold",
     "parse_pitch",
     "parse_target",
     "plan",
+    "plan_cycle",
     "read_csv",
+    "read_log",
+    "read_motion",
     "sample",
+    "size",
     "stop",
+    "torques",
+    "urdf",
     "write_csv",
+    "write_model",
+    "write_motion",
 ]

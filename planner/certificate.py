@@ -39,7 +39,7 @@ class Certificate:
     iterations: int
     """Solves of the planner, over all parts of the motion."""
     residual: float
-    """Relative gain in duration of the last solve, the largest of the parts."""
+    """What one more solve could still add, as a share of a limit, the most of the parts."""
 
     @property
     def broken(self) -> tuple[WorstRatio, ...]:

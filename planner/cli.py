@@ -4,7 +4,7 @@ import io
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import redirect_stdout
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
@@ -25,8 +25,23 @@ if TYPE_CHECKING:
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _PIPE_WIDTH = 132
+_CATALOGUE = "boom.catalogue"
 
-boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; else the third generation.")
+_boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; else the third generation.")
+_catalogue_option = click.option(
+    "--catalogue",
+    metavar="FILE.toml",
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({_CATALOGUE: value}),
+    help="Motors, gearboxes and actuators of your own, beside the shipped ones.",
+)
+
+
+def boom_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """--boom, and --catalogue, which `_load` finds in the context: whoever names a drive may have brought it."""
+    return _boom_option(_catalogue_option(command))
+
+
 payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; else the boom's own.")
 payload_as_option = click.option(
     "--payload-as", type=click.Choice(["mass", "force"]), default="mass", show_default=True,
@@ -41,6 +56,7 @@ vehicle_option = click.option(
     metavar="CASE",
     help="What the vehicle does meanwhile: slope, track, shock, ditch or a FILE.toml; else it rests.",
 )
+picture_option = click.option("--picture", metavar="FILE.png", help="The drives as a page of pictures.")
 pitch_option = click.option(
     "--pitch",
     default="down",
@@ -114,6 +130,7 @@ def cli() -> None:
 @click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
 @click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
 @report_option
+@picture_option
 @vehicle_option
 @boom_option
 @json_option
@@ -134,6 +151,7 @@ def plan(
     payload: float | None,
     out: str,
     csv_file: str | None,
+    picture: str | None,
     document: str | None,
     vehicle: str | None,
     boom_file: str | None,
@@ -159,7 +177,8 @@ def plan(
 
     boom = _load(boom_file, payload)
     case = None if vehicle is None else load_case(vehicle)
-    check_writable(out, csv_file)
+    _check_picture(picture)
+    check_writable(out, csv_file, picture)
     _require_document(document)
     targets = parse_target(start), parse_target(goal)
     options: dict[str, Any] = {
@@ -196,6 +215,11 @@ def plan(
     if csv_file is not None:
         write_csv(move.trajectory, csv_file, move.loads.tau)
         written["csv"] = csv_file
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        write_drive_picture(picture, boom, move.trajectory, move.loads.tau, report)
+        written["picture"] = picture
     _write_document(document, report, boom, move.trajectory, move.loads.tau, written)
     return _print_report(report, written, as_json)
 
@@ -366,8 +390,8 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
 
 
 @cli.command()
-@click.argument("motion", metavar="IN.csv")
-@click.option("--out", required=True, metavar="OUT.csv", help="The motion with tau1..tau5 appended.")
+@click.argument("motion", metavar="IN")
+@click.option("--out", required=True, metavar="OUT", help="The motion with its torques: .csv, .parquet, .yaml or .json.")
 @payload_option
 @payload_as_option
 @boom_option
@@ -375,42 +399,45 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
 def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
     """Inverse dynamics of a motion: the torque of each joint at each sample, with its friction where the boom's file gives it.
 
-    IN.csv holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
+    IN is a CSV or Parquet file that holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
 
     \b
     Example:
       boom torque move.csv --out torques.csv --payload 8
     """
     from boom_model import JOINTS
+    from planner.motion_files import form_of, read_motion, write_motion
     from planner.planning import torques
-    from planner.trajectory import read_csv, write_csv
 
-    boom, trajectory = _load(boom_file, payload), read_csv(motion)
+    form = form_of(out)
+    boom, trajectory = _load(boom_file, payload), read_motion(motion)
     tau = torques(boom, trajectory, payload_as)
-    write_csv(trajectory, out, tau)
+    write_motion(trajectory, out, tau)
     at = np.abs(tau).argmax(axis=0)
     peaks = [
         {"joint": joint, "tau": float(tau[k, i]), "unit": "N" if i == 3 else "Nm", "at_s": float(trajectory.t[k])}
         for i, (joint, k) in enumerate(zip(JOINTS, at, strict=True))
     ]
     if as_json:
-        _print_json({"peaks": peaks, "notes": list(trajectory.notes), "files": {"csv": out}})
+        _print_json({"peaks": peaks, "notes": list(trajectory.notes), "files": {form[1:]: out}})
         return 0
     table = _table("joint", "peak", "at")
     for peak in peaks:
         table.add_row(str(peak["joint"]), f"{peak['tau']:.3f} {peak['unit']}", f"{peak['at_s']:.3f} s")
     _console().print(table)
     _print_lines("Note", trajectory.notes)
-    click.echo(f"csv: {out}")
+    click.echo(f"{form[1:]}: {out}")
     return 0
 
 
 @cli.command()
-@click.argument("motion", metavar="IN.csv")
+@click.argument("motion", metavar="IN")
 @payload_option
 @payload_as_option
 @vehicle_option
+@click.option("--out", metavar="FILE.rrd", help="A recording of the motion, for `boom view`.")
 @report_option
+@picture_option
 @boom_option
 @json_option
 def check(
@@ -418,30 +445,304 @@ def check(
     payload: float | None,
     payload_as: Any,
     vehicle: str | None,
+    out: str | None,
+    picture: str | None,
     document: str | None,
     boom_file: str | None,
     as_json: bool,
 ) -> int:
-    """Hold any motion against the joint limits and the drives' datasheets.
+    """Hold any motion against the joint limits and the drives' datasheets. IN is a CSV or Parquet file.
 
     \b
     Example:
       boom plan transport phenotyping --csv move.csv
-      boom check move.csv --payload 8
+      boom check move.csv --payload 8 --out checked.rrd
     """
-    from planner.planning import check as check_motion
-    from planner.planning import torques
-    from planner.trajectory import read_csv
+    from planner.files import check_writable
+    from planner.motion_files import read_motion
+    from planner.planning import examine
     from planner.vehicle import load_case
 
     _require_document(document)
-    boom, trajectory = _load(boom_file, payload), read_csv(motion)
+    _check_picture(picture)
+    check_writable(out, document, picture)
+    boom, trajectory = _load(boom_file, payload), read_motion(motion)
     case = None if vehicle is None else load_case(vehicle)
-    report = check_motion(boom, trajectory, payload_as=payload_as, vehicle=case)
+    move = examine(boom, trajectory, payload_as=payload_as, vehicle=case)
     written: dict[str, str] = {}
+    if out is not None:
+        from planner.recording import write_recording
+
+        write_recording(out, move)
+        written["recording"] = out
     if document is not None:
-        _write_document(document, report, boom, trajectory, torques(boom, trajectory, payload_as, case), written)
-    return _print_report(report, written, as_json)
+        _write_document(document, move.report, boom, trajectory, move.loads.tau, written)
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        write_drive_picture(picture, boom, trajectory, move.loads.tau, move.report)
+        written["picture"] = picture
+    return _print_report(move.report, written, as_json)
+
+
+@cli.command()
+@click.argument("motion", metavar="IN")
+@click.argument("out", metavar="OUT")
+def export(motion: str, out: str) -> int:
+    """Turn a motion into another tool's form, by the ending of OUT.
+
+    \b
+    .csv          t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, and tau1..tau5 where IN has them
+    .parquet      the same columns, with their units
+    .yaml, .json  ROS trajectory_msgs/JointTrajectory
+
+    IN is a CSV or Parquet file; its torques go along as they are.
+
+    \b
+    Examples:
+      boom export move.csv move.parquet
+      boom torque move.csv --out torques.csv && boom export torques.csv move.yaml
+    """
+    from planner.motion_files import form_of, read_quantities, write_motion
+    from planner.trajectory import trajectory_of
+
+    form = form_of(out)
+    data, notes = read_quantities(motion)
+    trajectory = trajectory_of(motion, data, notes)
+    write_motion(trajectory, out, data.get("tau"))
+    _print_lines("Note", trajectory.notes)
+    click.echo(f"{form[1:]}: {out}")
+    return 0
+
+
+@cli.command()
+@click.argument("out", metavar="OUT.urdf|OUT.xml")
+@payload_option
+@boom_option
+def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
+    """Write the boom, with its payload, as URDF or as MJCF for MuJoCo (.xml).
+
+    \b
+    URDF  a tree: mimic joints keep the parallelogram. A torque that a tool computes for a
+          mimic joint belongs to the joint that it mimics.
+    MJCF  the loop closed by a constraint, a motor on each joint, the named poses as keyframes.
+
+    \b
+    Example:
+      boom export-model boom.urdf --payload 8
+    """
+    from planner.model_export import write_model
+
+    write_model(_load(boom_file, payload), out)
+    click.echo(f"model: {out}")
+    return 0
+
+
+@cli.command(context_settings={"ignore_unknown_options": True})  # so that --offset takes -0.5
+@click.argument("planned", metavar="PLANNED")
+@click.argument("measured", metavar="MEASURED")
+@click.option(
+    "--offset", default="0", show_default=True, metavar="S|best",
+    help="Added to the log's times; best fits them to the plan, and so hides a delay of the drives.",
+)  # fmt: skip
+@click.option("--window", type=float, metavar="S", help="Width of the filter that differentiates the log; else 0.2 s.")
+@click.option("--out", metavar="FILE.rrd", help="A recording of both, for `boom view`.")
+@payload_option
+@payload_as_option
+@boom_option
+@json_option
+def compare(
+    planned: str,
+    measured: str,
+    offset: str,
+    window: float | None,
+    out: str | None,
+    payload: float | None,
+    payload_as: Any,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Hold a measured motion against its plan: where joints and tip were, and what torques that takes.
+
+    PLANNED and MEASURED are CSV or Parquet files. MEASURED holds t, q1..q5 in SI, and any of qd1..qd5, qdd1..qdd5 and
+    tau1..tau5; derivatives that it lacks come from a Savitzky-Golay filter, whose noise is reported.
+
+    \b
+    Example:
+      boom compare move.csv log.csv --offset best --out both.rrd
+    """
+    from planner.comparison import WINDOW, read_log
+    from planner.comparison import compare as compare_motions
+    from planner.files import check_writable
+    from planner.motion_files import read_motion
+
+    try:
+        shift = None if offset == "best" else float(offset)
+    except ValueError:
+        raise InputError(f"offset {offset!r} is neither a number of seconds nor best") from None
+    check_writable(out)
+    found = compare_motions(
+        _load(boom_file, payload),
+        read_motion(planned),
+        read_log(measured),
+        offset=shift,
+        window=WINDOW if window is None else window,
+        payload_as=payload_as,
+    )
+    written = {}
+    if out is not None:
+        from planner.recording import write_comparison_recording
+
+        write_comparison_recording(out, found)
+        written["recording"] = out
+    answer = found.to_json(written)
+    if as_json:
+        _print_json(answer)
+        return 0
+    _print_comparison(answer)
+    return 0
+
+
+@cli.command()
+@click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
+@click.option("--joint", "joints", multiple=True, help="Compare the drive checks of this joint alone; may be given again.")
+@payload_option
+@payload_as_option
+@vehicle_option
+@click.option("--out", metavar="FILE.md", help="The report, or the comparison, as Markdown.")
+@picture_option
+@boom_option
+@json_option
+def mission(
+    missions: tuple[str, ...],
+    joints: tuple[str, ...],
+    payload: float | None,
+    payload_as: Any,
+    vehicle: str | None,
+    out: str | None,
+    picture: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Check a duty cycle of moves, holds and pauses as a whole; several of them side by side.
+
+    MISSION is a FILE.toml, or one of field-day, table-2-4 and table-3-1.
+
+    \b
+    Examples:
+      boom mission field-day --picture drives.png
+      boom mission table-2-4 table-3-1 --joint inner --joint lower
+    """
+    from planner.files import check_writable, write_text
+    from planner.missions import check_cycle, load_mission, plan_cycle
+    from planner.planning import torques
+    from planner.rows import Verdict
+    from planner.side_by_side import compared, comparison_markdown
+    from planner.vehicle import load_case
+
+    boom, case = _load(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    _check_picture(picture)
+    check_writable(out, picture)
+    if picture is not None and len(missions) > 1:
+        raise InputError(f"--picture {picture}: a page shows one mission, and {len(missions)} are given")
+    loaded = [load_mission(name) for name in missions]
+    cycles = {each.name: plan_cycle(boom, each, case) for each in loaded}
+    if len(cycles) < len(missions):
+        raise InputError(f"two missions bear one name: {', '.join(each.name for each in loaded)}")
+    reports = {name: check_cycle(boom, cycle, payload_as=payload_as, vehicle=case) for name, cycle in cycles.items()}
+    written: dict[str, str] = {}
+    header, rows = compared(reports, joints)
+    alone = len(reports) == 1 and not joints
+    if out is not None:
+        text = next(iter(reports.values())).to_markdown() if alone else comparison_markdown(header, rows)
+        write_text(out, text)
+        written["markdown"] = out
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        ((name, cycle),) = cycles.items()
+        tau = torques(boom, cycle.trajectory, payload_as, case)
+        moves = [samples for leg, samples in cycle.slices() if leg.moves]
+        write_drive_picture(picture, boom, cycle.trajectory, tau, reports[name], moves)
+        written["picture"] = picture
+    if alone:
+        return _print_report(next(iter(reports.values())), written, as_json)
+    if as_json:
+        _print_json({"missions": {name: report.to_json({}) for name, report in reports.items()}, "files": written})
+    else:
+        _print_rows(header, rows)
+        for name, report in reports.items():
+            _print_lines(f"{name}", (report.summary,))
+        for kind, name in written.items():
+            click.echo(f"{kind}: {name}")
+    return ANSWER_IS_NO if any(report.verdict is Verdict.FAIL for report in reports.values()) else 0
+
+
+@cli.command()
+@click.argument("mission", default="field-day")
+@click.option("--joint", "joints", multiple=True, help="Size this joint; may be given again; else every one.")
+@click.option("--voltage", "voltages", type=float, multiple=True, metavar="V", help="Bus voltage to try; may be given again.")
+@click.option(
+    "--adapt", type=click.Choice(["nothing", "rescale", "replan"]), default="nothing", show_default=True,
+    help="What may change to suit a drive: the moves slowed evenly, or planned anew.",
+)  # fmt: skip
+@click.option(
+    "--variant", "variants", multiple=True, metavar="BODY=KG,...",
+    help="A boom of other masses beside the given one, payload=KG among them; may be given again.",
+)  # fmt: skip
+@payload_option
+@payload_as_option
+@click.option("--out", metavar="FILE.md", help="The tables as Markdown.")
+@boom_option
+@json_option
+def size(
+    mission: str,
+    joints: tuple[str, ...],
+    voltages: tuple[float, ...],
+    adapt: str,
+    variants: tuple[str, ...],
+    payload: float | None,
+    payload_as: Any,
+    out: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Go through the catalogue for each joint: what does not fail, ranked by mass and margin, and why the rest does.
+
+    \b
+    Example:
+      boom size field-day --variant inner=5.55 --variant payload=5
+    """
+    from boom_model import JOINTS, Catalogue
+    from planner.files import check_writable, write_text
+    from planner.missions import load_mission, plan_cycle
+    from planner.sizing import Adapt, choose, parse_variant
+    from planner.sizing_tables import SAVING, motors, ranking, saving, sizing_json, sizing_markdown, sizing_notes
+
+    boom = _load(boom_file, payload)
+    check_writable(out)
+    catalogue = Catalogue.load().with_file(click.get_current_context().meta.get(_CATALOGUE))
+    booms = {"as it is": boom} | {text: parse_variant(boom, text) for text in variants}
+    cycle = plan_cycle(boom, load_mission(mission))
+    choices = choose(booms, cycle, joints or JOINTS, catalogue, voltages, Adapt(adapt), payload_as)
+    notes, written = sizing_notes(choices), {} if out is None else {"markdown": out}
+    if out is not None:
+        write_text(out, sizing_markdown(f"Drives for the mission {cycle.mission.name}", choices, notes))
+    if as_json:
+        _print_json(sizing_json(cycle.mission.name, choices, notes) | {"files": written})
+    else:
+        for choice in (choice for choice in choices if choice.judged):
+            click.echo(f"{choice.joint}, {choice.variant}")
+            _print_rows(*ranking(choice))
+            _print_lines("All are warned of", choice.warned)
+        click.echo("Each drive in its best supply")
+        _print_rows(*motors(choices))
+        click.echo("What the lightest saves")
+        _print_rows(SAVING, saving(choices))
+        _print_lines("Note", notes)
+        for kind, name in written.items():
+            click.echo(f"{kind}: {name}")
+    return ANSWER_IS_NO if any(choice.judged and choice.lightest is None for choice in choices) else 0
 
 
 @cli.command()
@@ -473,8 +774,34 @@ def view(recording: str) -> int:
 
 
 def _load(boom_file: str | None, payload: float | None = None) -> Boom:
-    boom = Boom.load(boom_file)
+    boom = Boom.load(boom_file, click.get_current_context().meta.get(_CATALOGUE))
     return boom if payload is None else boom.with_payload(payload)
+
+
+def _check_picture(picture: str | None) -> None:
+    if picture is not None and not picture.endswith(".png"):
+        raise InputError(f"{picture}: the drives' page is written as .png")
+
+
+def _print_comparison(answer: dict[str, Any]) -> None:
+    from planner.comparison import POSITION_HEADER, TORQUE_HEADER, position_cells, summary, torque_cells
+
+    console = _console()
+    for title, header, cells in (
+        ("Positions, measured less planned", POSITION_HEADER, position_cells),
+        ("Torques on level ground: the model's of the measured motion less the plan's, and the log's less the model's",
+         TORQUE_HEADER, torque_cells),
+    ):  # fmt: skip
+        console.print(title, highlight=False)
+        table = _table(*header)
+        for joint in answer["joints"]:
+            table.add_row(*cells(joint))
+        console.print(table)
+    _print_lines("Note", tuple(answer["notes"]))
+    for line in summary(answer):
+        console.print(line, highlight=False, soft_wrap=True)
+    for kind, name in answer["files"].items():
+        click.echo(f"{kind}: {name}")
 
 
 def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:
@@ -513,6 +840,16 @@ def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> i
     return ANSWER_IS_NO if report.verdict is Verdict.FAIL else 0
 
 
+_STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta", "INFO": "dim"}
+
+
+def _print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    table = _table(*header)
+    for row in rows:
+        table.add_row(*row)
+    _console().print(table)
+
+
 def _require_document(path: str | None) -> None:
     from planner.document import require_form
     from planner.files import check_writable
@@ -526,14 +863,13 @@ def _write_document(
     path: str | None, report: "Report", boom: Boom, motion: "Trajectory", tau: "Array", written: dict[str, str]
 ) -> None:
     from planner.document import write_document
+    from planner.drive_pictures import drive_figure
     from planner.move_pictures import move_pictures
 
     if path is not None:
-        write_document(path, report.to_markdown(), move_pictures(boom, motion, tau))
+        drives = {"Drives": drive_figure(boom, motion, tau, report)} if any(boom.drives) else {}
+        write_document(path, report.to_markdown(), move_pictures(boom, motion, tau) | drives)
         written["report"] = path
-
-
-_STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta"}
 
 
 def _print_lines(title: str | None, lines: Iterable[str]) -> None:

@@ -8,7 +8,7 @@ to which friction adds. The gearbox bears this torque; the motor accelerates its
 its speed, that is with x.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,6 +58,11 @@ class PathDynamics:
     """(n, 5) viscous friction per s'"""
     base: BaseMotion | None
 
+    def at(self, points: Array) -> "PathDynamics":
+        """The same at some of the points, by their numbers."""
+        names = ("s", "p1", "p2", "a", "b", "c", "coulomb", "viscous")
+        return replace(self, **{name: getattr(self, name)[points] for name in names})
+
     @property
     def x_max(self) -> Array:
         """(n,) the bound that the joint velocities set on x."""
@@ -66,9 +71,11 @@ class PathDynamics:
     def friction_tangent(self, x: Array) -> tuple[Array, Array]:
         """(n, 5) twice: intercept and slope over x of a line that friction, coulomb + viscous sqrt(x), never exceeds.
 
-        Its tangent at x (n,); where x is 0 that at the largest x that the joint velocities allow.
+        Its tangent at x (n,); at the ends, where x is 0, that of the point beside them, and without any x that at the largest
+        one that the joint velocities allow.
         """
         largest = np.minimum(self.x_max, _FINITE)
+        x = np.concatenate([x[1:2], x[1:-1], x[-2:-1]])
         root = np.sqrt(np.where(x > 0.0, np.clip(x, _LEAST_SHARE * largest, None), largest))[:, None]
         half = self.viscous / 2.0
         return self.coulomb + half * root, half / root

@@ -41,6 +41,16 @@ def replacing(path: str | Path) -> Iterator[str]:
             os.unlink(temporary)
 
 
+def write_text(path: str | Path, text: str) -> None:
+    """The text as a file.
+
+    Raises:
+        InputError: as `replacing`.
+    """
+    with replacing(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+
+
 def _beside(path: Path) -> str:
     """The name of a new, empty temporary file in the folder of `path`."""
     if path.exists() and not path.is_file():

@@ -21,7 +21,13 @@ Along = Literal["joint", "line"] | ArrayLike
 
 
 def legs(
-    boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, along: Along, stops: bool
+    boom: Boom,
+    targets: Sequence[Target],
+    pitch: float | None,
+    hold: Hold,
+    along: Along,
+    stops: bool,
+    reference: ArrayLike | None = None,
 ) -> tuple[list[Path], tuple[str, ...]]:
     """A path between each stop and the next, on branches that go on from each other, and what a report says of them.
 
@@ -30,6 +36,7 @@ def legs(
 
     Args:
         stops: whether the targets between the first and the last are stops; else one smooth path goes through them.
+        reference: joint position (5,) that the start of a tip line or arc is nearest to; None is the middle of the ranges.
 
     Raises:
         InputError: what leads the move does not fit the targets.
@@ -40,7 +47,7 @@ def legs(
     else:
         if not stops:
             raise InputError("a move through targets without a stop is led by the joints, not by a line or an arc of the tip")
-        paths, notes = _tip_paths(boom, targets, pitch, hold, along), ()
+        paths, notes = _tip_paths(boom, targets, pitch, hold, along, reference), ()
     for path in paths:
         if not isinstance(path, JointLine):  # a straight move is on a way that has been found clear
             require_path_clear(boom, path)
@@ -66,7 +73,9 @@ def _joint_paths(
     return paths, tuple(notes)
 
 
-def _tip_paths(boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, along: Along) -> list[Path]:
+def _tip_paths(
+    boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, along: Along, reference: ArrayLike | None
+) -> list[Path]:
     if isinstance(along, str) and along != "line":
         raise InputError(f"along is {along!r}; it must be 'joint', 'line' or a point of an arc")
     if not isinstance(along, str) and len(targets) != 2:
@@ -74,7 +83,7 @@ def _tip_paths(boom: Boom, targets: Sequence[Target], pitch: float | None, hold:
     if pitch is None:
         raise InputError("a line or an arc of the tip goes at constant pitch, which must be given")
     paths: list[Path] = []
-    last: Array | None = None
+    last = reference
     for a, b in pairwise([_place(target) for target in targets]):
         if np.array_equal(a, b):
             continue

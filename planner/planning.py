@@ -21,7 +21,9 @@ from boom_model.arrays import Array, checked
 from boom_model.dynamics import PayloadAs
 from boom_model.holds import Hold
 from planner.certificate import certify
-from planner.checks import Shock, check_rows
+from planner.checks import check_rows
+from planner.duty import Duty
+from planner.joint_view import Shock
 from planner.legs import Along, legs
 from planner.report import Report, assumptions, torque_peaks
 from planner.stopping import worst_stop
@@ -40,17 +42,18 @@ SHOCK_SAMPLES = 20
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A planned move, its loads, and what the checks say of it."""
+    """A move, its loads, and what the checks say of it."""
 
     boom: Boom
-    profile: Profile
+    profile: str
+    """A `Profile`, or what a motion from elsewhere is called."""
     trajectory: Trajectory
     loads: Loads
     parts: Breakdown
     """The torques' breakdown, friction included."""
     report: Report
     motions: tuple[Motion, ...]
-    """The continuous motions behind the samples, from stop to stop; none of an empty move."""
+    """The continuous motions behind a plan's samples, from stop to stop; none of an empty move or a motion from elsewhere."""
     vehicle: VehicleCase | None = None
 
 
@@ -97,6 +100,10 @@ def plan(
         InputError: an input is malformed or not finite.
         InfeasibleError: a target is out of reach or outside the limits, the duration is too short, something to be kept
             away from is in the way, or no motion keeps the drives' limits.
+
+    >>> move = plan(Boom.load(), "transport", "phenotyping", profile="time-optimal")
+    >>> round(move.report.duration, 3), str(move.report.verdict)
+    (4.333, 'INCOMPLETE')
     """
     if via_velocities is not None:
         stop_at_via = False
@@ -127,6 +134,7 @@ def check(
     payload_as: PayloadAs = "mass",
     vehicle: VehicleCase | None = None,
     profile: str = "recorded",
+    duty: Duty | None = None,
 ) -> Report:
     """The limit and drive checks of any motion, at its samples, with the joints' friction where it is known.
 
@@ -134,12 +142,26 @@ def check(
         payload_as: see `inverse_dynamics`.
         vehicle: what the vehicle does meanwhile; None rests on level ground.
         profile: what the report calls the motion.
+        duty: the cycle that the samples stand for; None is the motion alone.
     """
+    return examine(boom, trajectory, payload_as=payload_as, vehicle=vehicle, profile=profile, duty=duty).report
+
+
+def examine(
+    boom: Boom,
+    trajectory: Trajectory,
+    *,
+    payload_as: PayloadAs = "mass",
+    vehicle: VehicleCase | None = None,
+    profile: str = "recorded",
+    duty: Duty | None = None,
+) -> Move:
+    """Any motion with its loads and its checks, as `write_recording` takes it; for the arguments see `check`."""
     loads, parts, base = _loads(boom, trajectory, vehicle, payload_as)
     shock = None if vehicle is None or vehicle.peak == 0.0 else _shock(boom, trajectory, vehicle, payload_as)
-    return Report(
+    report = Report(
         profile=str(profile),
-        duration=trajectory.duration,
+        duration=trajectory.duration if duty is None else duty.duration,
         rows=check_rows(
             boom,
             trajectory,
@@ -148,11 +170,13 @@ def check(
             payload_as=payload_as,
             shock=shock,
             bases=() if vehicle is None else (vehicle.origin.basis,),
+            duty=duty,
         ),
         notes=(*trajectory.notes, *_vehicle_notes(vehicle)),
         assumptions=assumptions(boom, trajectory.qddd is not None),
         peaks=torque_peaks(trajectory.t, parts),
     )
+    return Move(boom, str(profile), trajectory, loads, parts, report, (), vehicle)
 
 
 def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None) -> Array:
@@ -161,7 +185,8 @@ def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", 
     Raises:
         InputError: as `inverse_dynamics`, or a torque is not finite.
     """
-    return _loads(boom, trajectory, vehicle, payload_as)[0].tau
+    base = None if vehicle is None else base_motion(vehicle, trajectory.t)
+    return _finite_loads(boom, trajectory, base, payload_as, reactions=False).tau
 
 
 def _loads(
@@ -170,27 +195,42 @@ def _loads(
     """Loads with friction, their breakdown, and the base's motion.
 
     Raises:
-        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+        InputError: as `_finite_loads`.
     """
     base = None if vehicle is None else base_motion(vehicle, trajectory.t)
     states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    loads = _finite_loads(boom, trajectory, base, payload_as)
     with np.errstate(over="ignore", invalid="ignore"):
-        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True)
-        finite = np.isfinite(loads.tau).all(axis=-1)
-        if not finite.all():
-            at = int(np.argmin(finite))
-            raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
         parts = breakdown(boom, *states, base=base, payload_as=payload_as, friction=True)
     return loads, parts, base
+
+
+def _finite_loads(
+    boom: Boom, trajectory: Trajectory, base: BaseMotion | None, payload_as: PayloadAs, reactions: bool = True
+) -> Loads:
+    """Loads with friction.
+
+    Raises:
+        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
+    """
+    states = (trajectory.q, trajectory.qd, trajectory.qdd)
+    with np.errstate(over="ignore", invalid="ignore"):
+        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True, reactions=reactions)
+    finite = np.isfinite(loads.tau).all(axis=-1)
+    if not finite.all():
+        at = int(np.argmin(finite))
+        raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
+    return loads
 
 
 def _shock(boom: Boom, trajectory: Trajectory, vehicle: VehicleCase, payload_as: PayloadAs) -> Shock:
     """What the joints bear without the shock, and whether the samples see it."""
     calm, _, _ = _loads(boom, trajectory, replace(vehicle, peak=0.0), payload_as)
     start, end = vehicle.shock_start, vehicle.shock_start + vehicle.shock_duration
-    inside = trajectory.t[0] <= start and end <= trajectory.t[-1]
-    samples = int(((trajectory.t >= start) & (trajectory.t <= end)).sum())
-    return Shock(calm.tau, inside and samples >= SHOCK_SAMPLES)
+    whole = trajectory.t[0] <= start and end <= trajectory.t[-1]
+    inside = (trajectory.t >= start) & (trajectory.t <= end)
+    resolved = bool(whole and inside.sum() >= SHOCK_SAMPLES)
+    return Shock(calm.tau, resolved, inside, vehicle.shock_duration, vehicle.shock_events)
 
 
 def _move(

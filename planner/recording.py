@@ -6,6 +6,10 @@
     /world/boom/<body>        its pose (frame "<body>" in "mount") over time, and its solid; likewise /world/boom/tip
     /plots/<quantity>/<joint> q, qd, qdd, tau over time, in deg and m, Nm and N; /plots/q/linkage is theta3 - theta2
     /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle, which add up to tau
+    /plots/motor/<joint>      motor torque, what the torque-speed curve leaves, and that with the stepper's margin [Nm]
+    /plots/gearbox/<joint>    gearbox torque and its ratings [Nm]
+    /plots/tip/deflection     what the drives let the tip deflect, in parts and in all [mm]
+    /drives                   the page of `drive_pictures`, where a joint has a motor
     /plots/mount/force, moment   of the boom on the mount, along frame 1 [N, Nm]
     .../limits                the limits beside it; those that do not change with the motion at the move's two ends only
     /report                   the report as Markdown
@@ -18,20 +22,22 @@ import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from scipy.spatial.transform import Rotation
 
-from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms
+from boom_model import JOINTS, Basis, Boom, Breakdown, Loads, body_transforms, forward_kinematics, tip_deflection
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
-from boom_model.drives import drive_inertia, drive_torque_limit
+from boom_model.drives import STEPPER_MARGIN, available_torque, drive_inertia, drive_torque_limit, motor_torque
 from boom_model.frames import R_LINK_BODY, frame_transforms
 from boom_model.keep_out import Box, KeepOut
 from boom_model.reach import ReachMap
+from planner.comparison import Comparison
+from planner.drive_pictures import drive_picture
 from planner.files import replacing
 from planner.planning import Move
 from planner.reach_picture import margin_colors, margin_range, reach_title, reference_pose
@@ -56,6 +62,9 @@ PIN_COLOR: Color = (60, 60, 60)
 PAYLOAD_COLOR: Color = (230, 230, 230)
 OUTSIDE_COLOR: Color = (90, 90, 90)
 
+_POSES_AT_ONCE = 20_000
+"""Samples whose poses are in memory together; each takes some 3 kB there, and 0.5 kB in the file."""
+
 _STEEL = 7850.0  # [kg/m^3]: the payload is shown as a ball of steel
 
 
@@ -69,7 +78,6 @@ def write_recording(path: str | Path, move: Move) -> None:
         InputError: the file cannot be written; an old one is left as it was.
     """
     boom, trajectory, loads, report = move.boom, move.trajectory, move.loads, move.report
-    poses = body_transforms(boom, trajectory.q)
     plots = _plots(boom, trajectory, loads)
     bundles = _bundles(move)
 
@@ -77,14 +85,49 @@ def write_recording(path: str | Path, move: Move) -> None:
         recording.send_blueprint(_blueprint(_eye(boom, trajectory.q), plots, bundles))
         recording.log("report", rr.TextDocument(report.to_markdown(), media_type="text/markdown"), static=True)
         _log_solids(recording, boom)
-        _log_motion(recording, trajectory.t, poses, move.vehicle)
+        _log_motion(recording, boom, trajectory.t, trajectory.q, move.vehicle)
         for plot in (plot for tab in plots.values() for plot in tab):
             _log_plot(recording, trajectory.t, plot)
         for bundle in (bundle for tab in bundles.values() for bundle in tab):
             _log_bundle(recording, trajectory.t, bundle)
+        if bundles.get("Drives"):
+            page = rr.EncodedImage(contents=drive_picture(boom, trajectory, loads.tau, report), media_type="image/png")
+            recording.log("drives", page, static=True)
 
     with replacing(path) as temporary:
         Path(temporary).write_bytes(_encoded(f"{boom.name}: {report.profile}, {report.duration:.3f} s", log))
+
+
+def write_comparison_recording(path: str | Path, comparison: Comparison) -> None:
+    """Writes a measured motion over its plan, with its blueprint. The entities are those of a move, but that
+
+    /world/boom             is the measured motion, solid, and /world/tip_path its tip's
+    /world/planned          is the planned one, its edges alone; frames "planned <body>" in "mount"; and its tip's path
+    /plots/<quantity>/<joint>   q and tau hold both, tau the measured torques too where the log has them
+    /plots/error/<joint>    measured less planned, in deg and m; /plots/error/tip the distance of the tips [mm]
+
+    Args:
+        path: the .rrd file.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    boom, t = comparison.boom, comparison.planned.t
+    tabs = _comparison_bundles(comparison)
+
+    def log(recording: rr.RecordingStream) -> None:
+        recording.send_blueprint(_blueprint(_eye(boom, comparison.planned.q), {}, tabs))
+        notes = "\n".join(f"- {note}" for note in (_COMPARISON_LEGEND, *comparison.notes))
+        recording.log("report", rr.TextDocument(notes, media_type="text/markdown"), static=True)
+        _log_solids(recording, boom)
+        _log_solids(recording, boom, ghost=True)
+        _log_motion(recording, boom, t, comparison.measured.q, None)
+        _log_motion(recording, boom, t, comparison.planned.q, None, ghost=True)
+        for bundle in (bundle for tab in tabs.values() for bundle in tab):
+            _log_bundle(recording, t, bundle)
+
+    with replacing(path) as temporary:
+        Path(temporary).write_bytes(_encoded(f"{boom.name}: measured and planned", log))
 
 
 def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> None:
@@ -118,7 +161,7 @@ def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> 
         recording.send_blueprint(_shown_beside(view, text, [3, 1]))
         recording.log("reading", rr.TextDocument(reading.replace("\n", "\n\n"), media_type="text/markdown"), static=True)
         _log_solids(recording, boom)
-        _log_motion(recording, np.zeros(1), body_transforms(boom, q[None]), None)
+        _log_motion(recording, boom, np.zeros(1), q[None], None)
         _log_reach(recording, reach_map, cells, half)
 
     with replacing(path) as temporary:
@@ -174,7 +217,11 @@ def _time(t: Array) -> rr.TimeColumn:
 # The linkage
 
 
-def _log_motion(recording: rr.RecordingStream, t: Array, poses: Mapping[str, Array], vehicle: VehicleCase | None) -> None:
+def _log_motion(
+    recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, vehicle: VehicleCase | None, ghost: bool = False
+) -> None:
+    place, prefix, color = ("planned", "planned ", LIMIT_COLOR) if ghost else ("boom", "", PAYLOAD_COLOR)
+
     def log(entity: str, T: Array, parent: str, child: str, times: Array) -> None:
         motion = rr.Transform3D.columns(
             translation=T[:, :3, 3],
@@ -184,17 +231,22 @@ def _log_motion(recording: rr.RecordingStream, t: Array, poses: Mapping[str, Arr
         )
         recording.send_columns(entity, [_time(times)], motion)
 
-    if vehicle is None:
-        log("world/mount", np.eye(4)[None], "tf#/world", "mount", t[:1])
-    else:
-        log("world/mount", base_pose(vehicle, t), "tf#/world", "mount", t)
-    for name, T in poses.items():
-        log(f"world/boom/{name}", T, "mount", name, t)
-    path = rr.LineStrips3D([poses["tip"][:, :3, 3]], colors=[PAYLOAD_COLOR], radii=[0.004])
-    recording.log("world/tip_path", path, rr.CoordinateFrame("mount"), static=True)
+    if not ghost:
+        mount = np.eye(4)[None] if vehicle is None else base_pose(vehicle, t)
+        log("world/mount", mount, "tf#/world", "mount", t[: len(mount)])
+    for start in range(0, len(t), _POSES_AT_ONCE):
+        part = slice(start, start + _POSES_AT_ONCE)
+        for name, T in body_transforms(boom, q[part]).items():
+            log(f"world/{place}/{name}", T, "mount", f"{prefix}{name}", t[part])
+    path = rr.LineStrips3D([forward_kinematics(boom, q).position], colors=[color], radii=[0.004])
+    recording.log("world/planned/tip_path" if ghost else "world/tip_path", path, rr.CoordinateFrame("mount"), static=True)
 
 
-def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
+def _log_solids(recording: rr.RecordingStream, boom: Boom, ghost: bool = False) -> None:
+    """The solids of the boom, or the edges alone of a second one's: "planned" stands before the names of its frames."""
+    place, prefix = ("planned", "planned ") if ghost else ("boom", "")
+    fill: Literal["solid", "majorwireframe"] = "majorwireframe" if ghost else "solid"
+
     def log(name: str, shape: rr.Boxes3D | rr.Cylinders3D | rr.Points3D, frame: str | None = None) -> None:
         recording.log(name, shape, *([] if frame is None else [rr.CoordinateFrame(frame)]), static=True)
 
@@ -203,7 +255,9 @@ def _log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
     for name, bars in _bars(boom).items():
         R = R_LINK_BODY[name]
         low, high = (np.array([corner(bar) for bar in bars]) @ R for corner in (_Bar.low, _Bar.high))
-        log(f"world/boom/{name}", _boxes(low, high, COLORS[name]), name)
+        log(f"world/{place}/{name}", _boxes(low, high, COLORS[name], fill), f"{prefix}{name}")
+    if ghost:
+        return
     for name, along in _pins(boom).items():
         centers = np.array([(e, 0.0, 0.0) for e in along]) @ R_LINK_BODY[name]
         # A cylinder lies along z, and these bodies' z is the pins' direction n.
@@ -237,9 +291,9 @@ def _log_keep_out(recording: rr.RecordingStream, keep_out: KeepOut) -> None:
         recording.log(entity, solid, rr.CoordinateFrame("mount"), static=True)
 
 
-def _boxes(low: Array, high: Array, color: Color) -> rr.Boxes3D:
-    """Solid boxes between opposite corners, (boxes, 3) each."""
-    return rr.Boxes3D(centers=(low + high) / 2.0, half_sizes=np.abs(high - low) / 2.0, colors=color, fill_mode="solid")
+def _boxes(low: Array, high: Array, color: Color, fill: Literal["solid", "majorwireframe"] = "solid") -> rr.Boxes3D:
+    """Boxes between opposite corners, (boxes, 3) each."""
+    return rr.Boxes3D(centers=(low + high) / 2.0, half_sizes=np.abs(high - low) / 2.0, colors=color, fill_mode=fill)
 
 
 @dataclass(frozen=True)
@@ -421,6 +475,75 @@ def _bundles(move: Move) -> dict[str, list[_Bundle]]:
             title = f"{kind} on the mount [{unit}]"
             curves = [f"{name} [{unit}]" for name in names]
             tabs["Mount"].append(_Bundle(f"plots/mount/{kind}", title, curves, colors, np.stack(series, axis=-1)))
+    if drives := list(_drive_bundles(move)):
+        tabs["Drives"] = [*drives, _tip_bundle(move)]
+    return tabs
+
+
+def _drive_bundles(move: Move) -> Iterator[_Bundle]:
+    """Each motor's torque beside its curve, and its gearbox's beside its ratings, all as sizes."""
+    motion, tau = move.trajectory, np.abs(move.loads.tau)
+    for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
+        if drive is None:
+            continue
+        gear = drive.gearbox
+        torque = motor_torque(drive, move.loads.tau[:, i], motion.qd[:, i], motion.qdd[:, i])
+        curve = available_torque(drive, gear.ratio * motion.qd[:, i])
+        if torque is not None and curve is not None:
+            basis = Basis.weakest([Basis.ESTIMATED, *(origin.basis for origin in drive.supply_origins)])
+            names = ["torque [Nm]", f"available ({basis}) [Nm]", f"with {STEPPER_MARGIN:.0%} margin ({basis}) [Nm]"]
+            values = np.stack([np.abs(torque), curve, curve / (1.0 + STEPPER_MARGIN)], axis=-1)
+            colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, LIMIT_COLOR]
+            yield _Bundle(f"plots/motor/{joint}", f"{joint}, {drive.motor.name} [Nm]", names, colors, values)
+        ratings = {
+            "rated": gear.continuous_torque,
+            "largest average": gear.max_average_torque,
+            "start-stop": gear.start_stop_torque,
+        }
+        known = {name: value for name, value in ratings.items() if value is not None}
+        names = ["torque [Nm]", *(f"{name} [Nm]" for name in known)]
+        values = np.stack([tau[:, i], *(np.full(len(tau), value) for value in known.values())], axis=-1)
+        colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, COLORS["upper"], LIMIT_COLOR]
+        yield _Bundle(f"plots/gearbox/{joint}", f"{joint}, {gear.name} [Nm]", names, colors[: len(names)], values)
+
+
+def _tip_bundle(move: Move) -> _Bundle:
+    """The error budget of the tip [mm]."""
+    budget = tip_deflection(move.boom, move.trajectory.q, move.loads.tau)
+    parts = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
+    names = [f"{name} [mm]" for name in ("wind-up", "hysteresis", "backlash", "step error", "in all")]
+    colors = [COLORS[b] for b in ("inner", "upper", "outer", "end_effector")]
+    values = np.stack(parts, axis=-1) * 1e3
+    return _Bundle(
+        "plots/tip/deflection", "tip's deflection by the drives, at most [mm]", names, [*colors, PAYLOAD_COLOR], values
+    )
+
+
+_COMPARISON_LEGEND = "Solid bodies and the light path: measured. Edges and the orange path: planned."
+
+
+def _comparison_bundles(c: Comparison) -> dict[str, list[_Bundle]]:
+    tabs: dict[str, list[_Bundle]] = {"Errors": [], "Torques": [], "Positions": []}
+    millimetres = c.tip_error[:, None] * 1e3
+    tabs["Errors"].append(
+        _Bundle("plots/error/tip", "distance of the tips [mm]", ["distance [mm]"], [PAYLOAD_COLOR], millimetres)
+    )
+    for i, joint in enumerate(JOINTS):
+        unit, force = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
+        color, pair = JOINT_COLORS[joint], ["planned", "measured"]
+        both = [LIMIT_COLOR, color]
+        positions = np.stack([_for_people(i, motion.q[:, i]) for motion in (c.planned, c.measured)], axis=-1)
+        tabs["Positions"].append(_Bundle(f"plots/q/{joint}", f"{joint} position [{unit}]", pair, both, positions))
+        error = _for_people(i, c.joint_error[:, i, None])
+        title = f"{joint}: measured less planned [{unit}]"
+        tabs["Errors"].append(_Bundle(f"plots/error/{joint}", title, ["measured less planned"], [color], error))
+        names, colors, torques = ["planned", "measured motion, by the model"], both, [c.tau_planned, c.tau_measured]
+        if c.tau_logged is not None:
+            names, colors = [*names, "measured"], [*both, PAYLOAD_COLOR]
+            torques.append(c.tau_logged)
+        values = np.stack([tau[:, i] for tau in torques], axis=-1)
+        name = "force" if IS_LENGTH[i] else "torque"
+        tabs["Torques"].append(_Bundle(f"plots/tau/{joint}", f"{joint} {name} [{force}]", names, colors, values))
     return tabs
 
 
@@ -436,10 +559,14 @@ def _log_bundle(recording: rr.RecordingStream, t: Array, bundle: _Bundle) -> Non
 def _blueprint(
     eye: rrb.EyeControls3D, plots: Mapping[str, Sequence[_Plot]], bundles: Mapping[str, Sequence[_Bundle]]
 ) -> rrb.Blueprint:
-    tabs = [rrb.Grid(*(_plot_view(plot) for plot in tab), grid_columns=2, name=name) for name, tab in plots.items()]
+    tabs: list[rrb.View | rrb.Container] = [
+        rrb.Grid(*(_plot_view(plot) for plot in tab), grid_columns=2, name=name) for name, tab in plots.items()
+    ]
     for name, tab in bundles.items():
         views = [rrb.TimeSeriesView(origin=f"/{bundle.entity}", name=bundle.title) for bundle in tab]
         tabs.append(rrb.Grid(*views, grid_columns=2 if len(views) > 2 else 1, name=name))
+    if bundles.get("Drives"):
+        tabs.append(rrb.Spatial2DView(origin="/drives", name="Drives' page"))
     report = rrb.TextDocumentView(origin="/report", name="Report")
     boom = rrb.Spatial3DView(origin="/world", name="Boom [m]", eye_controls=eye)
     return _shown_beside(boom, rrb.Tabs(*tabs, report, active_tab=0), [1, 1])
@@ -462,7 +589,8 @@ def _plot_view(plot: _Plot) -> rrb.TimeSeriesView:
 
 def _eye(boom: Boom, q: Array) -> rrb.EyeControls3D:
     """From the boom's right at the middle of its move, a little from above, and far enough off to see all of it."""
-    points = frame_transforms(boom, q, "outer")[..., :3, 3].reshape(-1, 3)
+    some = q[:: max(1, len(q) // 1000)]
+    points = frame_transforms(boom, some, "outer")[..., :3, 3].reshape(-1, 3)
     return _eye_on(points, float(q[len(q) // 2, 0]))
 
 

@@ -9,7 +9,8 @@ from boom_model import JOINTS, Basis, Boom, Breakdown
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from planner.certificate import Certificate, WorstRatio
-from planner.checks import ANGLE_CHECKS, Row, Verdict, overall
+from planner.checks import ANGLE_CHECKS
+from planner.rows import Row, Verdict, overall
 from planner.stopping import WorstStop
 
 
@@ -84,10 +85,8 @@ class Report:
         """What certificate and stop say, for people."""
         said = []
         if self.certificate is not None:
-            of = self.certificate
-            said.append(
-                f"Certificate: recomputed at {of.samples} points; {of.iterations} solve(s), the last gained {of.residual:.1e}"
-            )
+            of, more = self.certificate, f"one more could add {self.certificate.residual:.0e} of a limit"
+            said.append(f"Certificate: recomputed at {of.samples} points; {of.iterations} solve(s), {more}")
         if self.stop is not None:
             said.append(
                 f"Stopping: at worst {self.stop.time_s:.2f} s ({self.stop.time_way}, begun at {self.stop.time_at_s:.2f} s) and "
@@ -150,14 +149,19 @@ def cells(row: Row) -> tuple[str, ...]:
     return (
         row.joint,
         row.check,
-        "-" if row.demand is None else f"{row.demand * factor:.4g} {unit}",
-        "-" if row.limit is None else f"{row.limit * factor:.4g} {unit}",
+        "-" if row.demand is None else f"{_rounded(row.demand * factor)} {unit}".rstrip(),
+        "-" if row.limit is None else f"{_rounded(row.limit * factor)} {unit}".rstrip(),
         margin,
-        f"{row.required_margin:.0%}",
+        "-" if row.verdict is Verdict.INFO else f"{row.required_margin:.0%}",
         "-" if row.at_s is None else f"{row.at_s:.2f} s",
         row.verdict,
         row.basis or "-",
     )
+
+
+def _rounded(value: float) -> str:
+    """Four digits, and no power of ten below a million million."""
+    return f"{float(f'{value:.4g}'):.12g}"
 
 
 CERTIFICATE_HEADER = ("limit", "joint", "worst ratio", "at")
@@ -178,8 +182,14 @@ def peak_cells(peak: TorquePeak) -> tuple[str, ...]:
 
 
 def _for_people(row: Row) -> tuple[float, str]:
-    if row.unit == "rad/s" and row.check.startswith(("motor", "gearbox")):
+    if row.unit == "rad/s" and row.check.startswith(("motor", "gearbox", "actuator")):
         return 60.0 / (2.0 * np.pi), "rpm"
+    if row.unit == "rad" and row.check.startswith("gearbox"):
+        return 1e3, "mrad"
+    if row.joint == "tip" and row.unit == "m":
+        return 1e3, "mm"
+    if row.check == "gearbox life":
+        return 1.0 / 3600.0, "h"
     if row.unit.startswith("rad"):
         return 180.0 / np.pi, row.unit.replace("rad", "deg")
     return 1.0, row.unit

@@ -26,7 +26,7 @@ class TimeLaw:
     iterations: int = 1
     """Solves, of a law that is found by solving again."""
     residual: float = 0.0
-    """Relative gain in duration of the last solve: how far from converged."""
+    """How far from converged: what one more solve could still add, as a share of a limit."""
 
     @property
     def duration(self) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,9 @@ from boom_model.arrays import Array, checked, read_only
 from boom_model.errors import InputError
 from planner.files import replacing
 from planner.time_law import Motion
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 STEP = 0.01
 """Default sampling step [s], the thesis's (section 3.5)."""
@@ -123,17 +127,23 @@ def write_csv(trajectory: Trajectory, path: str | Path, tau: Array | None = None
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
     """
-    import pyarrow as pa
     from pyarrow import csv
+
+    with replacing(path) as temporary:
+        options = csv.WriteOptions(quoting_style="none", quoting_header="none")
+        csv.write_csv(motion_table(trajectory, tau), temporary, options)
+
+
+def motion_table(trajectory: Trajectory, tau: Array | None = None) -> "pa.Table":
+    """The motion's columns under COLUMNS, and TORQUES where given."""
+    import pyarrow as pa
 
     columns = [trajectory.t, *trajectory.q.T, *trajectory.qd.T, *trajectory.qdd.T]
     names = list(COLUMNS)
     if tau is not None:
         columns += [*tau.T]
         names += TORQUES
-    table = pa.table([np.ascontiguousarray(c) for c in columns], names=names)
-    with replacing(path) as temporary:
-        csv.write_csv(table, temporary, csv.WriteOptions(quoting_style="none", quoting_header="none"))
+    return pa.table([np.ascontiguousarray(c) for c in columns], names=names)
 
 
 def read_csv(path: str | Path) -> Trajectory:
@@ -145,36 +155,71 @@ def read_csv(path: str | Path) -> Trajectory:
         InputError: the file cannot be read, is not CSV, lacks a column or has one that is not known, or holds no samples,
             values that are not finite numbers, or times that do not increase.
     """
+    return trajectory_of(path, quantities(path, csv_table(path)))
+
+
+def csv_table(path: str | Path) -> "pa.Table":
+    """The table in a motion's CSV, its known columns float64.
+
+    Raises:
+        InputError: the file cannot be read, or is not CSV.
+    """
     import pyarrow as pa
     from pyarrow import csv
 
     numbers = dict.fromkeys((*COLUMNS, *TORQUES), pa.float64())
     try:
-        table = csv.read_csv(str(path), convert_options=csv.ConvertOptions(column_types=numbers))
+        return csv.read_csv(str(path), convert_options=csv.ConvertOptions(column_types=numbers))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     except pa.ArrowInvalid as error:
         raise InputError(f"{path}: not a motion's CSV: {error}") from None
+
+
+def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, with_torques: bool = False) -> dict[str, Array]:
+    """t (n,) and q, and qd, qdd and where asked for tau, as far as they are there, (n, 5) each, of a motion's table.
+
+    Args:
+        first: what a message calls the first sample.
+
+    Raises:
+        InputError: a column is missing, twice there or not known, or a value is not a finite number.
+    """
     names = set(table.column_names)
     _complain(path, "has twice the column", {name for name in names if table.column_names.count(name) > 1})
-    needed = set(COLUMNS if names & set(COLUMNS[6:]) else COLUMNS[:6])
+    looked_for = (*_QUANTITIES, "tau") if with_torques else _QUANTITIES
+    found = [name for name in looked_for if name == "q" or any(f"{name}{i}" in names for i in range(1, 6))]
+    needed = {"t", *(f"{name}{i}" for name in found for i in range(1, 6))}
     _complain(path, "lacks the column", needed - names)
-    _complain(path, "has an unknown column", names - numbers.keys())
-    data = {name: table[name].to_numpy() for name in needed}
-    for name, values in data.items():
+    _complain(path, "has an unknown column", names - {*COLUMNS, *TORQUES})
+    unit, start = first.split()
+    for name in needed:
+        values = table[name].to_numpy()
         if not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values)))
-            raise InputError(f"{path}: line {row + 2}, column {name}: {values[row]} is not a finite number")
-    stacked = {name: np.stack([data[f"{name}{i}"] for i in range(1, 6)], axis=-1) for name in _QUANTITIES if f"{name}1" in data}
+            raise InputError(f"{path}: {unit} {row + int(start)}, column {name}: {values[row]} is not a finite number")
+    stacked = {name: np.stack([table[f"{name}{i}"].to_numpy() for i in range(1, 6)], axis=-1) for name in found}
+    return {"t": table["t"].to_numpy()} | stacked
+
+
+def trajectory_of(path: str | Path, data: dict[str, Array], notes: tuple[str, ...] = ()) -> Trajectory:
+    """The motion in a file's quantities; a spline gives qd and qdd where neither is there.
+
+    Raises:
+        InputError: only one of qd and qdd, no samples, times that do not increase, or too few samples for the spline.
+    """
+    given = [name for name in ("qd", "qdd") if name in data]
+    if len(given) == 1:
+        _complain(path, "lacks the column", {f"{name}{i}" for name in {"qd", "qdd"} - {*given} for i in range(1, 6)})
     try:
-        if "qd" in stacked:
-            return Trajectory.from_samples(data["t"], stacked["q"], stacked["qd"], stacked["qdd"])
-        return _fitted(data["t"], stacked["q"])
+        if given:
+            return Trajectory.from_samples(data["t"], data["q"], data["qd"], data["qdd"], notes=notes)
+        return _fitted(data["t"], data["q"], notes)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
-def _fitted(t: Array, q: Array) -> Trajectory:
+def _fitted(t: Array, q: Array, notes: tuple[str, ...]) -> Trajectory:
     from scipy.interpolate import CubicSpline
 
     still = np.zeros_like(q)
@@ -182,7 +227,7 @@ def _fitted(t: Array, q: Array) -> Trajectory:
     if t.size < 4:
         raise InputError(f"{t.size} samples without velocities and accelerations; a spline needs at least 4")
     spline = CubicSpline(plain.t, plain.q)
-    return Trajectory.from_samples(t, q, spline(t, 1), spline(t, 2), notes=(_FITTED,))
+    return Trajectory.from_samples(t, q, spline(t, 1), spline(t, 2), notes=(*notes, _FITTED))
 
 
 def _complain(path: str | Path, what: str, names: set[str]) -> None:

@@ -41,6 +41,8 @@ class VehicleCase:
     shock_start: float = 0.0
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
     """Unit vector along frame 1."""
+    shock_events: float | None = None
+    """How many such shocks the drives are to survive; None where nobody says."""
 
     @property
     def is_steady(self) -> bool:
@@ -129,6 +131,7 @@ class _Shock(Table):
     peak_m_s2: Finite
     duration_s: Positive
     start_s: Finite = 0.0
+    events: Positive | None = None
     direction: Annotated[list[Finite], Field(min_length=3, max_length=3)] = Field(default_factory=lambda: [0.0, 0.0, 1.0])
 
 
@@ -177,4 +180,5 @@ def load_case(name: str) -> VehicleCase:
         shock_duration=1.0 if shock is None else shock.duration_s,
         shock_start=0.0 if shock is None else shock.start_s,
         direction=(x, y, z),
+        shock_events=None if shock is None else shock.events,
     )

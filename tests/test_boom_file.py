@@ -347,6 +347,8 @@ def test_motors_are_those_of_the_datasheet_in_si(name, holding, running, mass, r
         assert (winding.current, winding.resistance) == (amperes, ohms)
         assert winding.inductance == pytest.approx(millihenries / 1e3, rel=ROUNDING, abs=0)
     assert motor.source.strip()
+    assert motor.tolerance == pytest.approx(0.1, rel=ROUNDING, abs=0)
+    assert motor.microstep_accuracy == pytest.approx(np.radians(0.09), rel=ROUNDING, abs=0)
 
 
 def test_the_gearbox_is_that_of_the_datasheet_in_si():
@@ -370,9 +372,10 @@ def test_the_gearbox_is_that_of_the_datasheet_in_si():
     }
     for name, value in printed.items():
         assert getattr(gearbox, name) == pytest.approx(value, rel=ROUNDING, abs=0), name
-    assert gearbox.max_input_speed is None  # not on the sheet
+    absent = {"max_input_speed", "max_average_input_speed", "rated_life", "rated_input_speed"}
+    assert {getattr(gearbox, name) for name in absent} == {None}
     assert gearbox.source.strip()
-    assert {f.name for f in fields(gearbox)} == {*printed, "name", "source", "max_input_speed"}
+    assert {f.name for f in fields(gearbox)} == {*printed, *absent, "name", "source"}
 
 
 def test_figures_that_a_catalogue_leaves_out_are_none(tmp_path):
@@ -396,19 +399,99 @@ def test_part_of_a_torsion_curve_is_none_of_it(edited, line, name):
     assert getattr(gearbox, name) is None
 
 
-def test_a_users_input_speed_is_in_rpm(edited):
-    file = edited(("ratio = 160", "ratio = 160\nmax_input_speed_rpm = 3000"), shipped=CATALOGUE_FILE)
-    speed = Catalogue.load(file).gearboxes["CBG320160"].max_input_speed
-    assert speed == pytest.approx(100 * np.pi, rel=ROUNDING, abs=0)
+def test_a_users_speeds_are_in_rpm_and_life_in_hours(edited):
+    lines = "ratio = 160\nmax_input_speed_rpm = 3000\nmax_average_input_speed_rpm = 1500\nrated_life_h = 2\n"
+    file = edited(("ratio = 160\n", lines + "rated_input_speed_rpm = 750\n"), shipped=CATALOGUE_FILE)
+    gear = Catalogue.load(file).gearboxes["CBG320160"]
+    speeds = (gear.max_input_speed, gear.max_average_input_speed, gear.rated_input_speed)
+    assert speeds == pytest.approx((100 * np.pi, 50 * np.pi, 25 * np.pi), rel=ROUNDING, abs=0)
+    assert gear.rated_life == 7200.0
 
 
-def test_a_users_catalogue_drives_the_boom(edited):
-    file = edited(("[motors.MST342C02]", "[motors.MINE]"), shipped=CATALOGUE_FILE)
-    boom = Boom.load(edited(('"MST342C02"', '"MINE"'), ('"MST342C02"', '"MINE"')), catalogue=file)
-    assert [drive and drive.motor.name for drive in boom.drives] == [None, "MINE", "MINE", None, None]
-    message = refusal(lambda: Boom.load(catalogue=file))
-    assert "key joints.inner.drive.motor: 'MST342C02' is not in" in message
-    assert str(file) in message
+MINE = """
+[motors.MINE]
+source = "my own sheet"
+step_deg = 1.8
+
+[actuators.SCREW]
+source = "my own sheet"
+rated_force_N = 500
+peak_force_N = 800
+static_force_N = 900
+max_speed_m_s = 0.35
+stroke_m = 1.0
+lead_mm = 10
+efficiency_percent = 80
+backdrive_force_N = 100
+duty_percent = 25
+mass_kg = 4
+"""
+
+
+@pytest.fixture
+def own_catalogue(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(MINE)
+    return file
+
+
+def test_a_users_catalogue_adds_to_the_shipped_one(edited, own_catalogue):
+    shipped = Catalogue.load()
+    both = shipped.with_file(own_catalogue)
+    assert both.motors.keys() == {*shipped.motors, "MINE"}
+    assert both.gearboxes == shipped.gearboxes
+    assert shipped.with_file(None) is shipped
+    boom = Boom.load(edited(('motor = "MST342C02"', 'motor = "MINE"')), catalogue=own_catalogue)
+    assert [drive and drive.motor.name for drive in boom.drives] == [None, "MINE", "MST342C02", None, None]
+    message = refusal(lambda: Boom.load(edited(('"MST342C02"', '"NONE"')), catalogue=own_catalogue))
+    assert "key joints.inner.drive.motor: 'NONE' is not in catalogue.toml or" in message
+    assert str(own_catalogue) in message
+
+
+def test_a_name_that_is_taken_is_refused(own_catalogue):
+    own_catalogue.write_text(MINE.replace("motors.MINE", "motors.MST340B02"))
+    message = refusal(lambda: Boom.load(catalogue=own_catalogue))
+    assert message == f"{own_catalogue}: key motors.MST340B02: the name is taken by an entry that is known already"
+
+
+def test_a_users_actuator_drives_the_extension(edited, own_catalogue):
+    assert Boom.load().actuator is None
+    fitted = '[joints.extension.actuator]\nmodel = "SCREW"\nbrake = { value = true, basis = "printed", source = "sheet" }\n'
+    file = edited(("[joints.wrist]", fitted + "\n[joints.wrist]"))
+    drive = Boom.load(file, own_catalogue).actuator
+    expected = {
+        "rated_force": 500, "peak_force": 800, "static_force": 900, "max_speed": 0.35, "stroke": 1.0, "lead": 0.01,
+        "efficiency": 0.8, "backdrive_force": 100, "duty": 0.25, "mass": 4,
+    }  # fmt: skip
+    for name, value in expected.items():
+        assert getattr(drive.actuator, name) == pytest.approx(value, rel=ROUNDING, abs=0), name
+    assert {f.name for f in fields(drive.actuator)} == {*expected, "name", "source"}
+    assert drive.brake.value is True
+    assert "key joints.extension.actuator.model: 'SCREW' is not in catalogue.toml (none)" in refusal(lambda: Boom.load(file))
+
+
+@pytest.mark.parametrize("line", ["lead_mm = 0", "duty_percent = 101", "stroke_m = nan", "colour = 3", 'mass_kg = "4"'])
+def test_a_bad_actuator_names_file_entry_and_key(tmp_path, line):
+    file = tmp_path / "mine.toml"
+    file.write_text(f'[actuators.SCREW]\nsource = "mine"\n{line}\n')
+    assert refusal(lambda: Boom.load(catalogue=file)).startswith(f"{file}: key actuators.SCREW.{line.split(' ')[0]}")
+
+
+def test_a_body_of_another_mass_keeps_its_shape():
+    boom = Boom.load()
+    lighter = boom.with_body_mass("inner", 5.55)
+    old, new = boom.bodies["inner"], lighter.bodies["inner"]
+    assert new.mass == 5.55
+    np.testing.assert_array_equal(new.com, old.com)
+    np.testing.assert_allclose(new.inertia, old.inertia * 5.55 / 10.90205, rtol=ROUNDING)
+    assert {n for n in boom.bodies if lighter.bodies[n] is not boom.bodies[n]} == {"inner"}
+    for name, mass, said in (
+        ("leg", 1.0, "unknown body 'leg'"),
+        ("inner", -1.0, "-1 kg"),
+        ("inner", np.nan, "mass of inner is nan"),
+    ):
+        with pytest.raises(InputError, match=said):
+            boom.with_body_mass(name, mass)
 
 
 @pytest.mark.parametrize(

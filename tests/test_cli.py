@@ -308,6 +308,70 @@ def test_every_command_has_a_help_text(boom):
         assert out.startswith(f"Usage: boom {name}")
 
 
+def test_mission_checks_a_whole_cycle(boom, tmp_path):
+    code, out, err = boom("mission", "field-day", "--picture", "drives.png", "--out", "day.md")
+    assert (code, err) == (0, "")
+    assert sorted(os.listdir(tmp_path)) == ["day.md", "drives.png"]
+    assert "mission field day" in out
+    assert "20 x to tip=-1,1.7,0.9 along line" in out
+    assert (tmp_path / "drives.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "day.md").read_text().startswith("# INCOMPLETE")
+    code, out, _ = boom("mission", "field-day", "--json")
+    answer = json.loads(out)
+    assert answer["profile"] == "mission field day"
+    assert {row["verdict"] for row in answer["checks"]} == {"PASS", "WARN", "INFO", "NOT CHECKABLE"}
+
+
+def test_missions_stand_side_by_side(boom):
+    code, out, _ = boom("mission", "table-2-4", "table-3-1", "--joint", "inner", "--out", "both.md")
+    assert code == 0
+    assert "table 3-1: INCOMPLETE" in out
+    code, out, _ = boom("mission", "table-2-4", "table-3-1", "--json")
+    assert sorted(json.loads(out)["missions"]) == ["table 2-4", "table 3-1"]
+    code, _, err = boom("mission", "table-2-4", "table-3-1", "--picture", "x.png")
+    assert (code, "a page shows one mission" in err) == (2, True)
+    code, _, err = boom("mission", "table-2-4", "table-2-4")
+    assert (code, "two missions bear one name" in err) == (2, True)
+    code, _, err = boom("mission", "table-2-4", "--joint", "elbow")
+    assert (code, "unknown joint 'elbow'; there are: yaw" in err) == (2, True)
+    assert boom("mission", "field-day", "--payload", "30")[0] == 1  # its gearboxes fail
+
+
+def test_size_ranks_the_catalogue(boom, tmp_path):
+    code, out, err = boom("size", "table-3-1", "--variant", "inner=5.55", "--voltage", "80", "--out", "drives.md")
+    assert (code, err) == (0, "")
+    assert "Note: extension: NOT CHECKED, the catalogue has nothing for it" in out
+    assert "| inner=5.55 | together |  |  | 2.0 kg |" in (tmp_path / "drives.md").read_text()
+    code, out, _ = boom("size", "table-3-1", "--joint", "inner", "--json")
+    (choice,) = json.loads(out)["choices"]
+    assert choice["ranked"][0]["drive"] == "MST341B02 + CBG320160"
+    assert choice["saves_kg"] == pytest.approx(1.0)
+    assert boom("size", "table-3-1", "--joint", "inner", "--payload", "30")[0] == 1
+    assert boom("size", "table-3-1", "--joint", "elbow")[0] == 2
+
+
+def test_a_catalogue_of_ones_own_adds_to_the_choice(boom, tmp_path):
+    (tmp_path / "mine.toml").write_text('[gearboxes.MINE]\nsource = "mine"\nratio = 100\n')
+    code, out, _ = boom("size", "table-3-1", "--joint", "inner", "--catalogue", "mine.toml", "--json")
+    names = {judged["drive"] for judged in json.loads(out)["choices"][0]["ranked"]}
+    assert (code, len(names)) == (0, 8)
+    assert "MST342C02 + MINE" in names
+    text = BOOM_FILE.read_text().replace('"CBG320160"', '"MINE"')
+    (tmp_path / "boom.toml").write_text(text)
+    for command in (("ik", "1.4", "0", "1.0"), ("mission", "table-3-1"), ("plan", "transport", "phenotyping")):
+        assert boom(*command, "--boom", "boom.toml")[0] == 2
+        assert boom(*command, "--boom", "boom.toml", "--catalogue", "mine.toml")[0] == 0
+
+
+def test_plan_and_check_draw_the_drives(boom, tmp_path):
+    boom("plan", "transport", "phenotyping", "--csv", "move.csv", "--picture", "plan.png")
+    boom("check", "move.csv", "--picture", "check.png")
+    code, _, err = boom("check", "move.csv", "--picture", "check.pdf")
+    assert (code, "check.pdf: the drives' page is written as .png" in err) == (2, True)
+    for name in ("plan.png", "check.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
 def test_ik_does_not_import_what_is_slow():
     import subprocess
 

@@ -388,3 +388,13 @@ def test_bad_positions_are_named(function):
         function(BOOM, q)
     with pytest.raises(InputError, match=r"q has shape \(4,\); its last axis must have length 5"):
         function(BOOM, np.zeros(4))
+
+
+@pytest.mark.parametrize("loop", ["inner", "outer"])
+def test_many_states_at_once_are_each_as_alone(loop):
+    q = np.random.default_rng(4).uniform(-3.0, 3.0, (3, 1000, 5))
+    T = frame_transforms(BOOM, q, loop)
+    assert T.shape == (3, 1000, 11, 4, 4)
+    for index in ((0, 0), (1, 23), (1, 24), (2, 999)):
+        np.testing.assert_array_equal(T[index], frame_transforms(BOOM, q[index], loop))
+    assert frame_transforms(BOOM, q[:0], loop).shape == (0, 1000, 11, 4, 4)

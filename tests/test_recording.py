@@ -16,9 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, JOINTS, MOVING_BODIES, Boom
-from boom_model.drives import drive_inertia, drive_torque_limit
+from boom_model.drives import available_torque, drive_inertia, drive_torque_limit, motor_torque
 from boom_model.errors import InputError
 from boom_model.frames import R_LINK_BODY, body_transforms, frame_transforms
+from boom_model.gear_compliance import tip_deflection
 from boom_model.kinematics import forward_kinematics
 from boom_model.provenance import Basis, Origin
 from planner.planning import Move, plan
@@ -127,6 +128,34 @@ def test_boom_rides_on_the_vehicle(tmp_path: Path, recorded: Recorded):
 
 
 # The plots
+
+
+@pytest.mark.parametrize("i", [1, 2])
+def test_motors_and_gearboxes_stand_beside_what_they_may(recorded: Recorded, i: int):
+    drive, motion, tau = BOOM.drives[i], recorded.move.trajectory, recorded.move.loads.tau[:, i]
+    assert drive is not None
+    curve = available_torque(drive, 160 * motion.qd[:, i])
+    torque = motor_torque(drive, tau, motion.qd[:, i], motion.qdd[:, i])
+    expected = np.stack([np.abs(torque), curve, curve / 1.5], axis=-1)
+    np.testing.assert_allclose(recorded.scalars(f"/plots/motor/{JOINTS[i]}"), expected, rtol=1e-12)
+    assert recorded.static(f"/plots/motor/{JOINTS[i]}", "SeriesLines:names")[1] == "available (assumed) [Nm]"
+    gearbox = recorded.scalars(f"/plots/gearbox/{JOINTS[i]}")
+    np.testing.assert_array_equal(gearbox[:, 0], np.abs(tau))
+    assert gearbox[0, 1:].tolist() == [172.0, 275.0, 460.0]
+
+
+def test_the_tips_budget_and_the_drives_page_are_there(recorded: Recorded):
+    budget = tip_deflection(BOOM, recorded.move.trajectory.q, recorded.move.loads.tau)
+    np.testing.assert_allclose(recorded.scalars("/plots/tip/deflection")[:, -1], 1e3 * budget.total, rtol=1e-12)
+    page = bytes(np.asarray(recorded.static("/drives", "EncodedImage:blob")[0], dtype=np.uint8))
+    assert page.startswith(b"\x89PNG")
+
+
+def test_a_boom_without_motors_has_no_page(tmp_path: Path):
+    bare = replace(BOOM, drives=(None,) * 5)
+    recording = Recorded(tmp_path / "bare.rrd", plan(bare, "transport", "phenotyping", step=0.1))
+    write(recording.path, recording.move)
+    assert not [name for name in recording.entities() if "drives" in name or "motor" in name]
 
 
 @pytest.mark.parametrize("i", range(5), ids=JOINTS)
@@ -330,17 +359,17 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
     shown = blueprint(recording)
     origins = [row[0] for row in shown["ViewBlueprint:space_origin"]]
     plots = {e for e in recording.entities() if e.startswith("/plots/") and not e.endswith("/limits")}
-    assert len(plots) == 4 * 5 + 1 + 5 + 2
-    assert sorted(origins) == sorted(plots | {"/world", "/report"})
+    assert len(plots) == 4 * 5 + 1 + 5 + 2 + 2 * 2 + 1
+    assert sorted(origins) == sorted(plots | {"/world", "/report", "/drives"})
     classes = [row[0] for row in shown["ViewBlueprint:class_identifier"]]
-    assert sorted(set(classes)) == ["3D", "TextDocument", "TimeSeries"]
+    assert sorted(set(classes)) == ["2D", "3D", "TextDocument", "TimeSeries"]
     names = dict(zip(origins, (row[0] for row in shown["ViewBlueprint:display_name"]), strict=True))
     style = "SeriesLines" if which == "recorded" else "SeriesPoints"  # no line goes through one sample
     for plot in plots:
         curves = recording.static(plot, f"{style}:names")
-        assert names[plot] == curves[0] if len(curves) == 1 else "[N" in names[plot]
+        assert names[plot] == curves[0] if len(curves) == 1 else "[N" in names[plot] or "[mm]" in names[plot]
     tabs = {row[0] for row in shown["ContainerBlueprint:display_name"]}
-    assert tabs == {"Positions", "Velocities", "Accelerations", "Torques", "Torque parts", "Mount"}
+    assert tabs == {"Positions", "Velocities", "Accelerations", "Torques", "Torque parts", "Mount", "Drives"}
     assert shown["TimePanelBlueprint:timeline"] == [["t"]]
 
 
@@ -376,7 +405,7 @@ def test_old_recording_survives_a_failure_in_the_middle(recorded: Recorded, tmp_
     path = tmp_path / "move.rrd"
     path.write_text("an old recording")
     move = recorded.move
-    short = replace(move, loads=replace(move.loads, tau=move.loads.tau[:-1]))
+    short = replace(move, trajectory=replace(move.trajectory, t=move.trajectory.t[:-1]))
     with pytest.raises(ValueError, match="length"):
         write(path, short)
     assert path.read_text() == "an old recording"

@@ -23,7 +23,7 @@ from boom_model.holds import (
 from boom_model.inverse_kinematics import inverse_kinematics
 from boom_model.kinematics import forward_kinematics
 from planner import Profile, TipTarget, plan, sample
-from planner.constraints import motor_limits, path_dynamics
+from planner.constraints import motor_limits, path_dynamics, rotors
 from planner.path import TipArc, TipLine, TipPath, follow
 
 BOOM = Boom.load()
@@ -355,5 +355,5 @@ def test_the_planners_dynamics_are_the_booms_along_a_curved_path():
     demands, rate, gain = path_dynamics(BOOM, path, s), 0.3, 0.2
     q, p1, p2 = (path(s, order) for order in range(3))
     tau = at_the_drives(q, p1 * rate, p1 * gain + p2 * rate**2)
-    rotors = demands.rotors * (demands.p1 * gain + demands.p2 * rate**2)
-    np.testing.assert_allclose(demands.a * gain + demands.b * rate**2 + demands.c + rotors, tau, rtol=0, atol=1e-11)
+    driven = rotors(BOOM) * (demands.p1 * gain + demands.p2 * rate**2)
+    np.testing.assert_allclose(demands.a * gain + demands.b * rate**2 + demands.c + driven, tau, rtol=0, atol=1e-11)

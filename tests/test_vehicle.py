@@ -124,6 +124,20 @@ def test_shock_is_held_against_the_momentary_peak_torque_alone():
     assert repeated.verdict is Verdict.PASS
 
 
+def test_a_case_says_how_often_its_shock_comes(tmp_path):
+    """At 2.5 s joint 2 of the main move turns at 18 deg/s: less than half a turn of the input in 30 ms, so 1e4 times."""
+    head = 'name = "often"\nbasis = "assumed"\nsource = "made up"\n[shock]\npeak_m_s2 = 29.43\nduration_s = 0.03\n'
+    (tmp_path / "often.toml").write_text(head + "start_s = 2.5\nevents = 20000\n")
+    silent, often = load_case("shock"), load_case(str(tmp_path / "often.toml"))
+    assert (silent.shock_events, often.shock_events) == (None, 20000.0)
+    rows = [
+        rows_of(plan(BOOM, "transport", "phenotyping", vehicle=v).report, "inner", "gearbox momentary peaks")
+        for v in (silent, often)
+    ]
+    assert [row.verdict for row in rows] == [Verdict.NOT_CHECKABLE, Verdict.FAIL]
+    assert rows[1].limit == 1e4  # 3 rpm, 480 at the input: 0.24 turns
+
+
 @pytest.mark.parametrize(
     ("shock", "resolved"),
     [({}, True), ({"shock_start": 4.9}, False), ({"shock_start": 9.0}, False), ({"shock_duration": 1e-3}, True)],

@@ -42,7 +42,8 @@ def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None
     for _ in range(2 * _STEPS):
         middle = np.sqrt(quick * slow)
         quick, slow = (middle, slow) if over(sharp.stretched(middle)) else (quick, middle)
-    best, solves = sharp.stretched(slow), sharp.iterations
+    even = sharp.stretched(slow)
+    best, solves = even, sharp.iterations
     floor = np.abs(path_dynamics(boom, path, np.linspace(0.0, 1.0, GRID_INTERVALS + 1), base).c).max(axis=0)
     peak = np.abs(_torque(boom, Motion(path, sharp), base)[2]).max(axis=0)
     low, high = 0.0, 1.0
@@ -57,7 +58,7 @@ def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None
         low, high = (low, share) if over(capped) else (share, high)
         if not over(capped) and capped.duration < best.duration:
             best = capped
-    return replace(best, iterations=solves, residual=max(best.residual, high - low))
+    return replace(best, iterations=solves, residual=max(best.residual, high - low if best is not even else 0.0))
 
 
 def _torque(boom: Boom, motion: Motion, base: BaseMotion | None) -> tuple[Array, Array, Array]:

