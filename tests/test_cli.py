@@ -38,7 +38,7 @@ def test_plan_does_the_main_job(boom, tmp_path):
     np.testing.assert_array_equal(read_csv("move.csv").q, expected.trajectory.q)
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", [profile.value for profile in Profile])
 def test_plan_as_json_prints_one_object(boom, profile):
     code, out, _ = boom("plan", "transport", "tip=1.4,0,1.0", "--hold", "extension=0.25", "--profile", profile, "--json")
     answer = json.loads(out)
