@@ -1,0 +1,326 @@
+"""The least mass of a link under stress, deflection, buckling, least and largest height and taper, by its optimality conditions.
+
+With moments frozen, as Appendix D freezes those of its stage 1, a link has least mass where
+
+    minimise   rho w int H dx
+    subject to H >= H_stress,  sum_i c_ki / H_i^3 <= deflection (every load case k),  P_cr(H) >= P,  |dH/dx| <= taper
+
+which is convex. `interior_point` solves it, bound and all.
+
+With the beam's own mass the moments follow the heights. Then each height costs, beside its own mass, what its inertia adds to
+the moments, shears and normal forces inboard, priced at the multipliers; heights, forces and prices are repeated until they
+agree, which is where the optimality conditions of the whole problem hold. Where the own load adds to the end's at every station,
+stress and deflection are posynomials of the heights, convex in log H (Boyd and others, A tutorial on geometric programming,
+2007): what solves the conditions is then the least, and the Lagrangian bounds it from below.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from boom_model.arrays import Array, read_only, scalar
+from boom_model.errors import InfeasibleError, InputError
+from boom_model.link_design.beam import (
+    Beam,
+    Forces,
+    LoadCases,
+    added_by_height,
+    deflection,
+    deflection_coefficients,
+    internal_forces,
+    mass,
+    stress_height,
+    von_mises,
+)
+from boom_model.link_design.buckling import critical_load
+from boom_model.link_design.interior_point import Capacity, Optimum, Problem, solve
+
+_AGREED = 1e-9
+"""Relative change of the mass at which heights and forces agree."""
+
+_MOST_REPEATS = 60
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a link must keep."""
+
+    stress: float
+    """Largest von Mises stress [Pa]"""
+    deflection: float
+    """Largest deflection of a cantilever's end or a strut's middle [m]"""
+    min_height: float = 0.0
+    """[m]"""
+    max_height: float | None = None
+    """[m]; None leaves it free"""
+    max_taper: float | None = None
+    """Largest |dH/dx|; None leaves it free"""
+    buckling_factor: float | None = None
+    """Critical end load over the largest one; None does not ask for it"""
+
+    def __post_init__(self) -> None:
+        named = {"stress limit": self.stress, "deflection limit": self.deflection, "maximum height": self.max_height,
+                 "maximum taper": self.max_taper, "buckling factor": self.buckling_factor}  # fmt: skip
+        for name, value in named.items():
+            if value is not None and not scalar(name, value) > 0.0:
+                raise InputError(f"{name} is {value:g}; it must be above 0: nothing else holds it")
+        if scalar("minimum height", self.min_height) < 0.0:
+            raise InputError(f"minimum height is {self.min_height:g} m; it must be at least 0 m")
+        if self.max_height is not None and self.min_height >= self.max_height:
+            raise InputError(
+                f"minimum height {self.min_height:g} m is not below the maximum height of {self.max_height:g} m: no height is left"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A link's heights and what they keep."""
+
+    beam: Beam
+    cases: LoadCases
+    limits: Limits
+    heights: Array
+    """(n + 1,) [m]"""
+    stress_heights: Array
+    """(n + 1,) of the stress, and of the least height, alone [m]"""
+    mass: float
+    """[kg]"""
+    stress_mass: float
+    deflection: float
+    """[m], the largest of the load cases, with the moments that the design was made for"""
+    stress_deflection: float
+    max_stress: float
+    """[Pa]"""
+    buckling_load: float
+    """Critical end load of the tapered column, the lesser of both planes [N]"""
+    pressed: float
+    """The largest end load along the link [N], compression positive"""
+    lower_bound: float | None
+    """[kg] that no link under these limits can go below; None where none is proven"""
+    governing: tuple[int, ...]
+    """The load cases whose deflection is at its limit"""
+    shares: dict[str, float]
+    """Share of the stations at the stress limit, the least height, and neither"""
+    repeats: int
+
+    @property
+    def gap(self) -> float | None:
+        """(mass - lower bound) / mass."""
+        return None if self.lower_bound is None else (self.mass - self.lower_bound) / self.mass
+
+
+def least_mass(beam: Beam, cases: LoadCases, limits: Limits, *, own_mass: bool = True) -> Design:
+    """The link of least mass.
+
+    Args:
+        own_mass: whether the final beam's own mass bends it; False freezes the forces of the stress-only beam, as Appendix D.
+
+    Raises:
+        InfeasibleError: no heights keep the limits; says which limit stops them.
+    """
+    before = stress_only(beam, cases, limits)
+    forces = internal_forces(beam, before, cases)
+    start = float(deflection(beam, before, forces).max())
+    price = beam.material.density * beam.width * beam.weights
+    search = _Search(beam, cases, limits, price)
+    H, found = before, None
+    for repeat in range(1, _MOST_REPEATS + 1):  # noqa: B007
+        found = search.solve(forces, price)
+        change = abs(mass(beam, found.heights) - mass(beam, H)) / mass(beam, H)
+        H = found.heights
+        if not own_mass:
+            break
+        forces = internal_forces(beam, H, cases)
+        price = search.price(H, forces, found)
+        if repeat > 1 and change <= _AGREED:
+            break
+    else:
+        raise InfeasibleError(f"after {_MOST_REPEATS} repeats the link's mass and its own load do not agree: it does not carry itself")
+    assert found is not None
+    bound: float | None = found.lower_bound
+    if own_mass:
+        bound = _lower_bound(search, H, forces, found)
+    stressed = von_mises(beam, H, forces)
+    at_stress = search.low > np.maximum(limits.min_height, 0.0)
+    tight = H <= search.low * (1.0 + 1e-5)
+    shares = {"stress": float((tight & at_stress).mean()), "least height": float((tight & ~at_stress).mean())}
+    return Design(
+        beam=beam,
+        cases=cases,
+        limits=limits,
+        heights=read_only(H),
+        stress_heights=read_only(before),
+        mass=mass(beam, H),
+        stress_mass=mass(beam, before),
+        deflection=float(deflection(beam, H, forces).max()),
+        stress_deflection=start,
+        max_stress=float(stressed.max()),
+        buckling_load=buckling_load(beam, H, cases),
+        pressed=pressed(cases),
+        lower_bound=bound,
+        governing=tuple(sorted(search.deflecting)) if found.multipliers.deflections.size else (),
+        shares={**shares, "neither": 1.0 - sum(shares.values())},
+        repeats=repeat,
+    )
+
+
+def stress_only(beam: Beam, cases: LoadCases, limits: Limits) -> Array:
+    """Least heights (n + 1,) that hold the stress with their own mass, station by station: exact (thesis, section 3.3).
+
+    The load of a station depends on those beyond it alone, so what is repeated settles from the end inwards.
+
+    Raises:
+        InfeasibleError: the heights grow without end, or beyond the maximum.
+    """
+    top = np.inf if limits.max_height is None else limits.max_height
+    H = np.full(beam.slices + 1, limits.min_height)
+    for _ in range(_MOST_REPEATS):
+        needed = np.maximum(stress_height(beam, internal_forces(beam, H, cases), limits.stress).max(axis=0), limits.min_height)
+        if not np.isfinite(needed).all() or needed.max() > 1e3 * beam.length:
+            raise InfeasibleError("the link cannot carry its own load within the stress limit")
+        if (needed > top).any():
+            i = int(np.argmax(needed))
+            raise InfeasibleError(
+                f"at x = {beam.stations[i]:.4g} m the stress needs a height of {needed[i]:.4g} m, above the maximum of {top:g} m"
+            )
+        if np.abs(needed - H).max() <= 1e-14 * max(float(needed.max()), 1e-300):
+            break
+        H = needed
+    if not needed.max() > 0.0:
+        raise InfeasibleError("nothing loads the link and there is no minimum height: its least mass is 0")
+    return np.maximum(needed, 1e-9 * float(needed.max()))  # a free end of no load has no height, and no stiffness
+
+
+def pressed(cases: LoadCases) -> float:
+    """The largest compressive end load of the cases [N]; below 0 where all pull."""
+    return float(-cases.end_force[:, 0].min())
+
+
+def buckling_load(beam: Beam, H: Array, cases: LoadCases) -> float:
+    """Critical end load [N], the lesser of both planes, under the strongest own load of the cases."""
+    return min(critical_load(beam, H, _pressing(beam, cases), plane).load for plane in ("across", "in-plane"))
+
+
+def _pressing(beam: Beam, cases: LoadCases) -> Array:
+    """An axial acceleration (2,) that at every station is at least each case's."""
+    a = cases.acceleration[:, 0]
+    root, end = a[:, 0].max(), (a[:, 0] + a[:, 1] * beam.length).max()
+    return np.array([root, (end - root) / beam.length])
+
+
+class _Search:
+    """The convex problem at given forces and prices, with the deflections, and the buckling, found to matter so far."""
+
+    def __init__(self, beam: Beam, cases: LoadCases, limits: Limits, mass_per_height: Array) -> None:
+        self.beam, self.cases, self.limits, self.mass_per_height = beam, cases, limits, mass_per_height
+        self.deflecting: list[int] = []
+        self.low = np.zeros(beam.slices + 1)
+        load = pressed(cases)
+        asked = limits.buckling_factor is not None and load > 0.0
+        self.buckles = False
+        self.buckling = float(limits.buckling_factor or 0.0) * load if asked else 0.0
+
+    def solve(self, forces: Forces, price: Array) -> Optimum:
+        beam, limits = self.beam, self.limits
+        needed = stress_height(beam, forces, limits.stress)
+        self.low = np.maximum(needed.max(axis=0), limits.min_height)
+        self.low = np.maximum(self.low, 1e-9 * self.low.max())
+        C = deflection_coefficients(beam, forces.M) / limits.deflection
+        taper = None if limits.max_taper is None else np.full(beam.slices, limits.max_taper * beam.step)
+        while True:
+            capacity = self._capacity if self.buckles else None
+            found = solve(Problem(price, self.low, self._upper(C), taper, C[self.deflecting], capacity))
+            deflections = (C / found.heights**3).sum(axis=1)
+            worst = int(np.argmax(deflections))
+            if deflections[worst] > 1.0 + 1e-8 and worst not in self.deflecting:
+                self.deflecting.append(worst)
+            elif self.buckling > 0.0 and not self.buckles and self._capacity(found.heights).value < 1.0:
+                self.buckles = True
+            else:
+                return found
+
+    def _capacity(self, H: Array) -> Capacity:
+        critical = critical_load(self.beam, H, _pressing(self.beam, self.cases))
+        P = self.buckling
+        return Capacity(critical.load / P, critical.gradient / P, critical.curvature / np.sqrt(P))
+
+    def _upper(self, C: Array) -> Array:
+        """The maximum height, or one that no best link reaches: four times what one height for all stations asks for."""
+        top = self.limits.max_height
+        if top is None:
+            level = max(float(self.low.max()), float(C.sum(axis=1).max(initial=0.0)) ** (1.0 / 3.0))
+            if self.buckling > 0.0:
+                level = max(level, level / self._capacity(np.full(self.low.size, level)).value)
+            top = 4.0 * level
+        return np.full(self.beam.slices + 1, top)
+
+    def price(self, H: Array, forces: Forces, found: Optimum) -> Array:
+        """What each height costs: its mass, and what its inertia adds to every force that a multiplier prices, (n + 1,)."""
+        used, weights = self._weights(H, forces, found)
+        return self.mass_per_height + added_by_height(self.beam, self.cases.at(used), weights)
+
+    def _weights(self, H: Array, forces: Forces, found: Optimum) -> tuple[Array, Forces]:
+        """The priced cases, and the price of each force at each station."""
+        beam, limits = self.beam, self.limits
+        governing = stress_height(beam, forces, limits.stress).argmax(axis=0)
+        multiplier = np.where(self.low > limits.min_height, found.multipliers.lower, 0.0)
+        multiplier = np.where(multiplier > 1e-7 * multiplier.max(initial=0.0), multiplier, 0.0)
+        used = np.unique([*self.deflecting, *governing[multiplier > 0.0]]).astype(int)
+        N, V, M = (f[used] for f in forces)
+        k = np.searchsorted(used, governing)
+        chosen = (np.arange(used.size)[:, None] == k) * multiplier
+        s = limits.stress * beam.width
+        bent = np.abs(N) * H + 6.0 * np.abs(M)
+        falls = 4.0 * s**2 * H**3 - 2.0 * bent * np.abs(N) - 6.0 * V**2 * H
+        rate = np.divide(chosen, falls, out=np.zeros_like(N), where=falls > 0.0)
+        wN, wV, wM = rate * 2.0 * bent * H * np.sign(N), rate * 6.0 * V * H**2, rate * 12.0 * bent * np.sign(M)
+        per_moment = deflection_coefficients(beam, np.ones_like(M)) / (limits.deflection * H**3)
+        for case, z in zip(self.deflecting, found.multipliers.deflections, strict=True):
+            at = int(np.searchsorted(used, case))
+            wM[at] += z * per_moment[at] * np.sign(M[at])
+        return used, Forces(wN, wV, wM)
+
+
+def _lower_bound(search: _Search, H: Array, forces: Forces, found: Optimum) -> float | None:
+    """A mass that no link goes below, its own mass and all; None where none is proven.
+
+    Looks at those load cases alone whose own load adds to the end's, which is no more than leaving constraints out. Their
+    forces at least are those of the stress-only beam: the frozen problem bounds the mass. The Lagrangian in log H at the
+    multipliers found does so too, and closely, where neither buckling nor taper decides; its gradient, which is nearly 0,
+    is followed to the ends of the range of heights.
+    """
+    beam, cases, limits = search.beam, search.cases, search.limits
+    adding = _adding(beam, cases)
+    if not adding.any():
+        return None
+    some = cases.at(np.flatnonzero(adding))
+    least = stress_only(beam, some, limits)
+    frozen = _Search(beam, some, limits, search.mass_per_height)
+    bound = frozen.solve(internal_forces(beam, least, some), search.mass_per_height).lower_bound
+    used, weights = search._weights(H, forces, found)
+    if limits.max_taper is not None or not adding[used].all():
+        return bound
+    price = search.mass_per_height + added_by_height(beam, cases.at(used), weights)
+    stress_price = np.where(search.low > limits.min_height, found.multipliers.lower, 0.0)
+    C = deflection_coefficients(beam, forces.M[search.deflecting]) / limits.deflection
+    z = found.multipliers.deflections
+    gradient = H * (price - 3.0 * (z @ C) / H**4 - stress_price)
+    top = np.full_like(H, 4.0 * H.max() if limits.max_height is None else limits.max_height)
+    down, up = np.log(np.minimum(least, H) / H), np.log(top / H)
+    slack = float(z @ ((C / H**3).sum(axis=1) - 1.0))
+    stress = von_mises(beam, H, forces).max(axis=0)
+    # p - 1 <= 0 with p = (stress / limit)^2 has the multiplier of H >= H_stress over -dp/dH, at most H / 2 of it.
+    slack -= float(np.abs(stress_price * H * ((stress / limits.stress) ** 2 - 1.0)).sum())
+    return max(bound, mass(beam, H) + slack + float(np.minimum(gradient * down, gradient * up).sum()))
+
+
+def _adding(beam: Beam, cases: LoadCases) -> Array:
+    """The cases (k,) whose every internal force grows in size with every height; none for a strut, whose shear changes sign."""
+    if beam.support != "cantilever":
+        return np.zeros(cases.count, dtype=bool)
+    end, a = cases.end_force, cases.acceleration
+    far = a[..., 0] + a[..., 1] * beam.length
+    against = (end * a[..., 0] <= 0.0) & (end * far <= 0.0)
+    turned = cases.end_moment * end[:, 1] >= 0.0
+    steady = (a[..., 0] * far >= 0.0).all(axis=1)
+    return np.asarray(against.all(axis=1) & turned & steady)
