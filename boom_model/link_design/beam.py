@@ -74,6 +74,9 @@ class Beam:
 
 MOST_SLICES = 100_000
 
+SHEAR_FACTOR = 5.0 / 6.0
+"""Of a rectangle, in Timoshenko's theory."""
+
 
 @dataclass(frozen=True, eq=False)
 class LoadCases:
@@ -214,10 +217,22 @@ def deflection_coefficients(beam: Beam, M: Array) -> Array:
     return c
 
 
-def deflection(beam: Beam, H: ArrayLike, forces: Forces) -> Array:
-    """Deflection (k,) [m] of a cantilever's end or a strut's middle: see `deflection_coefficients`."""
-    total: Array = (deflection_coefficients(beam, forces.M) / _heights(beam, H) ** 3).sum(axis=-1)
-    return total
+def shear_coefficients(beam: Beam, V: Array) -> Array:
+    """d (k, n + 1) [m^2] of the deflection sum_i d_i / H_i that shear adds (Timoshenko): 1.2 |V| |dlever/dx| dx / (G w)."""
+    per_force = 1.0 if beam.support == "cantilever" else 0.5
+    d: Array = np.abs(V) * per_force * beam.weights / (SHEAR_FACTOR * beam.material.shear_modulus * beam.width)
+    return d
+
+
+def deflection(beam: Beam, H: ArrayLike, forces: Forces, *, shear: bool = False) -> Array:
+    """Deflection (k,) [m] of a cantilever's end or a strut's middle: see the coefficients above.
+
+    Args:
+        shear: whether to count the sections' shear. The thesis does not.
+    """
+    H = _heights(beam, H)
+    total: Array = (deflection_coefficients(beam, forces.M) / H**3).sum(axis=-1)
+    return total + (shear_coefficients(beam, forces.V) / H).sum(axis=-1) if shear else total
 
 
 def _heights(beam: Beam, H: ArrayLike) -> Array:

@@ -9,7 +9,8 @@ which is convex. `interior_point` solves it, bound and all.
 
 With the beam's own mass the moments follow the heights. Then each height costs, beside its own mass, what its inertia adds to
 the moments, shears and normal forces inboard, priced at the multipliers; heights, forces and prices are repeated until they
-agree, which is where the optimality conditions of the whole problem hold. Where the own load adds to the end's at every station,
+agree, which is where the optimality conditions of the whole problem hold; the deflection by shear, sum_i d_i / H_i, is treated
+alike. Where the own load adds to the end's at every station,
 stress and deflection are posynomials of the heights, convex in log H (Boyd and others, A tutorial on geometric programming,
 2007): what solves the conditions is then the least, and the Lagrangian bounds it from below.
 """
@@ -29,6 +30,7 @@ from boom_model.link_design.beam import (
     deflection_coefficients,
     internal_forces,
     mass,
+    shear_coefficients,
     stress_height,
     von_mises,
 )
@@ -87,8 +89,10 @@ class Design:
     """[kg]"""
     stress_mass: float
     deflection: float
-    """[m], the largest of the load cases, with the moments that the design was made for"""
+    """[m], the largest of the load cases, with the forces and the theory that the design was made for"""
     stress_deflection: float
+    shear: bool
+    """Whether the deflections count the sections' shear"""
     max_stress: float
     """[Pa]"""
     buckling_load: float
@@ -109,30 +113,32 @@ class Design:
         return None if self.lower_bound is None else (self.mass - self.lower_bound) / self.mass
 
 
-def least_mass(beam: Beam, cases: LoadCases, limits: Limits, *, own_mass: bool = True) -> Design:
+def least_mass(beam: Beam, cases: LoadCases, limits: Limits, *, own_mass: bool = True, shear: bool = True) -> Design:
     """The link of least mass.
 
     Args:
         own_mass: whether the final beam's own mass bends it; False freezes the forces of the stress-only beam, as Appendix D.
+        shear: whether the sections' shear counts in the deflection; not where the forces are frozen.
 
     Raises:
         InfeasibleError: no heights keep the limits; says which limit stops them.
     """
     before = stress_only(beam, cases, limits)
     forces = internal_forces(beam, before, cases)
-    start = float(deflection(beam, before, forces).max())
+    shear = shear and own_mass
+    start = float(deflection(beam, before, forces, shear=shear).max())
     price = beam.material.density * beam.width * beam.weights
-    search = _Search(beam, cases, limits, price)
+    search = _Search(beam, cases, limits, price, shear)
     H, found = before, None
     for repeat in range(1, _MOST_REPEATS + 1):  # noqa: B007
-        found = search.solve(forces, price)
+        found = search.solve(H, forces, price)
         change = abs(mass(beam, found.heights) - mass(beam, H)) / mass(beam, H)
         H = found.heights
         if not own_mass:
             break
         forces = internal_forces(beam, H, cases)
         price = search.price(H, forces, found)
-        if repeat > 1 and change <= _AGREED:
+        if repeat > 1 and change <= max(_AGREED, (found.value - found.lower_bound) / found.value):
             break
     else:
         raise InfeasibleError(f"after {_MOST_REPEATS} repeats the link's mass and its own load do not agree: it does not carry itself")
@@ -152,8 +158,9 @@ def least_mass(beam: Beam, cases: LoadCases, limits: Limits, *, own_mass: bool =
         stress_heights=read_only(before),
         mass=mass(beam, H),
         stress_mass=mass(beam, before),
-        deflection=float(deflection(beam, H, forces).max()),
+        deflection=float(deflection(beam, H, forces, shear=shear).max()),
         stress_deflection=start,
+        shear=shear,
         max_stress=float(stressed.max()),
         buckling_load=buckling_load(beam, H, cases),
         pressed=pressed(cases),
@@ -211,8 +218,8 @@ def _pressing(beam: Beam, cases: LoadCases) -> Array:
 class _Search:
     """The convex problem at given forces and prices, with the deflections, and the buckling, found to matter so far."""
 
-    def __init__(self, beam: Beam, cases: LoadCases, limits: Limits, mass_per_height: Array) -> None:
-        self.beam, self.cases, self.limits, self.mass_per_height = beam, cases, limits, mass_per_height
+    def __init__(self, beam: Beam, cases: LoadCases, limits: Limits, mass_per_height: Array, shear: bool) -> None:
+        self.beam, self.cases, self.limits, self.mass_per_height, self.shear = beam, cases, limits, mass_per_height, shear
         self.deflecting: list[int] = []
         self.low = np.zeros(beam.slices + 1)
         load = pressed(cases)
@@ -220,12 +227,25 @@ class _Search:
         self.buckles = False
         self.buckling = float(limits.buckling_factor or 0.0) * load if asked else 0.0
 
-    def solve(self, forces: Forces, price: Array) -> Optimum:
+    def deflections(self, H: Array, forces: Forces) -> tuple[Array, Array]:
+        """C (k, n + 1) of C / H^3 <= 1, one a case, and the deflection (k,) [m] that 1 stands for.
+
+        Shear's d / H is taken as (d H0^2 / 3) / H^3 + 2 d / (3 H0), which has its value and its slope at the heights H0 given.
+        """
+        C = deflection_coefficients(self.beam, forces.M)
+        left = np.full(self.cases.count, self.limits.deflection)
+        if self.shear:
+            d = shear_coefficients(self.beam, forces.V)
+            C, left = C + d * H**2 / 3.0, left - (2.0 / 3.0 * d / H).sum(axis=1)
+            left = np.maximum(left, 0.1 * self.limits.deflection)  # a stress-only beam may be over the limit by shear alone
+        return C / left[:, None], left
+
+    def solve(self, H: Array, forces: Forces, price: Array) -> Optimum:
         beam, limits = self.beam, self.limits
         needed = stress_height(beam, forces, limits.stress)
         self.low = np.maximum(needed.max(axis=0), limits.min_height)
         self.low = np.maximum(self.low, 1e-9 * self.low.max())
-        C = deflection_coefficients(beam, forces.M) / limits.deflection
+        C, _ = self.deflections(H, forces)
         taper = None if limits.max_taper is None else np.full(beam.slices, limits.max_taper * beam.step)
         while True:
             capacity = self._capacity if self.buckles else None
@@ -256,10 +276,10 @@ class _Search:
 
     def price(self, H: Array, forces: Forces, found: Optimum) -> Array:
         """What each height costs: its mass, and what its inertia adds to every force that a multiplier prices, (n + 1,)."""
-        used, weights = self._weights(H, forces, found)
+        used, weights = self.weights(H, forces, found)
         return self.mass_per_height + added_by_height(self.beam, self.cases.at(used), weights)
 
-    def _weights(self, H: Array, forces: Forces, found: Optimum) -> tuple[Array, Forces]:
+    def weights(self, H: Array, forces: Forces, found: Optimum) -> tuple[Array, Forces]:
         """The priced cases, and the price of each force at each station."""
         beam, limits = self.beam, self.limits
         governing = stress_height(beam, forces, limits.stress).argmax(axis=0)
@@ -274,10 +294,13 @@ class _Search:
         falls = 4.0 * s**2 * H**3 - 2.0 * bent * np.abs(N) - 6.0 * V**2 * H
         rate = np.divide(chosen, falls, out=np.zeros_like(N), where=falls > 0.0)
         wN, wV, wM = rate * 2.0 * bent * H * np.sign(N), rate * 6.0 * V * H**2, rate * 12.0 * bent * np.sign(M)
-        per_moment = deflection_coefficients(beam, np.ones_like(M)) / (limits.deflection * H**3)
+        (_, left), ones = self.deflections(H, forces), np.ones_like(H)
+        per_moment, per_force = deflection_coefficients(beam, ones) / H**3, shear_coefficients(beam, ones) / H
         for case, z in zip(self.deflecting, found.multipliers.deflections, strict=True):
             at = int(np.searchsorted(used, case))
-            wM[at] += z * per_moment[at] * np.sign(M[at])
+            wM[at] += z / left[case] * per_moment * np.sign(M[at])
+            if self.shear:
+                wV[at] += z / left[case] * per_force * np.sign(V[at])
         return used, Forces(wN, wV, wM)
 
 
@@ -295,14 +318,14 @@ def _lower_bound(search: _Search, H: Array, forces: Forces, found: Optimum) -> f
         return None
     some = cases.at(np.flatnonzero(adding))
     least = stress_only(beam, some, limits)
-    frozen = _Search(beam, some, limits, search.mass_per_height)
-    bound = frozen.solve(internal_forces(beam, least, some), search.mass_per_height).lower_bound
-    used, weights = search._weights(H, forces, found)
+    frozen = _Search(beam, some, limits, search.mass_per_height, shear=False)
+    bound = frozen.solve(least, internal_forces(beam, least, some), search.mass_per_height).lower_bound
+    used, _ = search.weights(H, forces, found)
     if limits.max_taper is not None or not adding[used].all():
         return bound
-    price = search.mass_per_height + added_by_height(beam, cases.at(used), weights)
+    price = search.price(H, forces, found)
     stress_price = np.where(search.low > limits.min_height, found.multipliers.lower, 0.0)
-    C = deflection_coefficients(beam, forces.M[search.deflecting]) / limits.deflection
+    C = search.deflections(H, forces)[0][search.deflecting]
     z = found.multipliers.deflections
     gradient = H * (price - 3.0 * (z @ C) / H**4 - stress_price)
     top = np.full_like(H, 4.0 * H.max() if limits.max_height is None else limits.max_height)

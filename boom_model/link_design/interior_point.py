@@ -110,7 +110,8 @@ def solve(problem: Problem) -> Optimum:
         if best is not None and best[0] - lower_bound < 0.9 * gap:
             gap, improved = best[0] - lower_bound, iteration
         mean, error = float(s @ z) / s.size, float(np.abs(f + s).max())
-        if best is not None and (gap <= GAP * best[0] or iteration > improved + _PATIENCE):
+        patience = _PATIENCE if best is None or gap > 1e-3 * best[0] else 5
+        if best is not None and (gap <= GAP * best[0] or iteration > improved + patience):
             break
         try:
             newton = _Newton(p, x, s, z, capacity)
