@@ -15,7 +15,7 @@ stress and deflection are posynomials of the heights, convex in log H (Boyd and 
 2007): what solves the conditions is then the least, and the Lagrangian bounds it from below.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -123,9 +123,42 @@ def least_mass(beam: Beam, cases: LoadCases, limits: Limits, *, own_mass: bool =
     Raises:
         InfeasibleError: no heights keep the limits; says which limit stops them.
     """
+    some = _first_guess(beam, cases, limits)
+    while True:
+        design = _least_mass(beam, cases.at(some), limits, own_mass, shear and own_mass)
+        more = np.setdiff1d(_broken(design, cases), some)
+        if not more.size:
+            governing = tuple(int(some[k]) for k in design.governing)
+            return replace(design, cases=cases, governing=governing)
+        some = np.union1d(some, more)
+
+
+def _first_guess(beam: Beam, cases: LoadCases, limits: Limits) -> Array:
+    """Load cases that are likely to matter, and those that press the link together hardest."""
+    if cases.count == 1:
+        return np.zeros(1, dtype=int)
+    H = np.full(beam.slices + 1, max(limits.min_height, 0.05 * beam.length))
+    forces = internal_forces(beam, H, cases)
+    a = cases.acceleration[:, 0]
+    pressing = [cases.end_force[:, 0].argmin(), a[:, 0].argmax(), (a[:, 0] + a[:, 1] * beam.length).argmax()]
+    return np.unique([*von_mises(beam, H, forces).argmax(axis=0), deflection(beam, H, forces).argmax(), *pressing]).astype(int)
+
+
+def _broken(design: Design, cases: LoadCases) -> Array:
+    """The load cases that break the stress limit worst at some station, and the deflection limit worst."""
+    if cases.count == design.cases.count or cases.count == 1:
+        return np.empty(0, dtype=int)
+    beam, limits, H = design.beam, design.limits, design.heights
+    forces = internal_forces(beam, H, cases)
+    stress, bent = von_mises(beam, H, forces), deflection(beam, H, forces, shear=design.shear)
+    over = stress.max(axis=0) > limits.stress * (1.0 + 1e-6)
+    worst = [] if bent.max() <= limits.deflection * (1.0 + 1e-6) else [int(bent.argmax())]
+    return np.unique([*stress.argmax(axis=0)[over], *worst]).astype(int)
+
+
+def _least_mass(beam: Beam, cases: LoadCases, limits: Limits, own_mass: bool, shear: bool) -> Design:
     before = stress_only(beam, cases, limits)
     forces = internal_forces(beam, before, cases)
-    shear = shear and own_mass
     start = float(deflection(beam, before, forces, shear=shear).max())
     price = beam.material.density * beam.width * beam.weights
     search = _Search(beam, cases, limits, price, shear)
@@ -307,21 +340,21 @@ class _Search:
 def _lower_bound(search: _Search, H: Array, forces: Forces, found: Optimum) -> float | None:
     """A mass that no link goes below, its own mass and all; None where none is proven.
 
-    Looks at those load cases alone whose own load adds to the end's, which is no more than leaving constraints out. Their
-    forces at least are those of the stress-only beam: the frozen problem bounds the mass. The Lagrangian in log H at the
+    Looks at those load cases alone whose own load adds to the end's, which is no more than leaving constraints out; none is
+    proven where others decide. Their forces at least are those of the stress-only beam: the frozen problem bounds the mass. The Lagrangian in log H at the
     multipliers found does so too, and closely, where neither buckling nor taper decides; its gradient, which is nearly 0,
     is followed to the ends of the range of heights.
     """
     beam, cases, limits = search.beam, search.cases, search.limits
     adding = _adding(beam, cases)
-    if not adding.any():
+    used, _ = search.weights(H, forces, found)
+    if not adding[used].all():
         return None
     some = cases.at(np.flatnonzero(adding))
     least = stress_only(beam, some, limits)
     frozen = _Search(beam, some, limits, search.mass_per_height, shear=False)
     bound = frozen.solve(least, internal_forces(beam, least, some), search.mass_per_height).lower_bound
-    used, _ = search.weights(H, forces, found)
-    if limits.max_taper is not None or not adding[used].all():
+    if limits.max_taper is not None:
         return bound
     price = search.price(H, forces, found)
     stress_price = np.where(search.low > limits.min_height, found.multipliers.lower, 0.0)

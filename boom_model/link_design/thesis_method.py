@@ -13,7 +13,7 @@ import numpy as np
 
 from boom_model.arrays import Array, read_only
 from boom_model.errors import InfeasibleError, InputError
-from boom_model.link_design.beam import Beam
+from boom_model.link_design.beam import Beam, LoadCases
 
 MOST_STEPS = 200_000
 """Steps of delta-H that a station may be high."""
@@ -29,6 +29,12 @@ class ThesisLoad:
     """(3,) acceleration less gravity that Appendix D gives to frame 5 [m/s^2]."""
     angular_velocity: Array
     angular_acceleration: Array
+
+    @property
+    def cases(self) -> LoadCases:
+        """As a load case of the beam: pressed together and down, and its own weight with it."""
+        (ax, ay, _), (wx, wy, wz), spin = self.acceleration, self.angular_velocity, self.angular_acceleration[2]
+        return LoadCases.of([-self.applied], [[[ax, -(wy**2 + wz**2)], [ay, spin + wx * wy]]])
 
 
 THESIS_LOAD = ThesisLoad(
