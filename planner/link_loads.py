@@ -1,7 +1,7 @@
 """What moves ask of a link: the force at its end and its own acceleration at every instant, along its own axes.
 
-x runs from the link's root to its end, y across it in the arm's plane. Accelerations are less gravity. Forces along the pins (the
-thesis's z) are left out of a link's design, as the thesis leaves them: how two pins share them is statically indeterminate.
+x runs from the link's root to its end, y across it in the arm's plane. Accelerations are less gravity. Forces along the pins,
+the thesis's z, are left out as there: how two pins share them is statically indeterminate.
 """
 
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ def link_cases(
 def largest_components(cases: LoadCases) -> LoadCases:
     """Each component's largest size at once, even where they do not meet: the thesis's way (section 3.5).
 
-    One load case that pulls and one that presses, as far as the cases do either; own loads have the sign that adds to the end's.
+    One load case that pulls and one that presses, as far as the cases do either; own loads add to the end's.
     """
     fx, fy = cases.end_force.T
     across = fy[np.abs(fy).argmax()]
@@ -61,7 +61,7 @@ def largest_components(cases: LoadCases) -> LoadCases:
 
 
 def thesis_load(boom: Boom, link: Link, trajectories: Sequence[Trajectory], *, payload_as: PayloadAs = "mass") -> ThesisLoad:
-    """The largest components of motions as a load of the thesis's method (section 3.5): forces, rates, acceleration of the centre.
+    """The largest components of motions, in forces, rates and the centre's acceleration, as a load of the thesis's method.
 
     Raises:
         InputError: as `link_cases`, or the link is not the inner or the lower one.

@@ -20,7 +20,6 @@ from boom_model.link_design import (
     Link,
     LoadCases,
     Material,
-    critical_load,
     deflection,
     euler_load,
     internal_forces,
@@ -28,17 +27,16 @@ from boom_model.link_design import (
     link_body,
     load_link,
     mass,
-    stress_height,
     thesis_design,
     von_mises,
     with_body,
 )
 from boom_model.link_design.exact import buckling_load, pressed
-from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
+from boom_model.link_design.finite_elements import Solution, Theory, solve_beam, solve_plate
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
 from planner.checks import Verdict
 from planner.link_loads import largest_components, link_cases, thesis_load
-from planner.planning import check
+from planner.planning import check, plan, plan_each_profile
 from planner.trajectory import Trajectory
 
 E = TypeVar("E", bound=StrEnum)
@@ -259,8 +257,19 @@ def design_link(boom: Boom, task: Task, trajectories: Sequence[Trajectory]) -> L
     )
 
 
+def default_moves(boom: Boom, task: Task) -> list[Trajectory]:
+    """Transport to phenotyping: with every profile in its least time, or the thesis's cubic of 5 s where its load is taken.
+
+    Raises:
+        InputError, InfeasibleError: as `plan`.
+    """
+    if task.load == LoadFrom.THESIS:
+        return [plan(boom, "transport", "phenotyping", duration=5.0).trajectory]
+    return plan_each_profile(boom, "transport", "phenotyping")
+
+
 def thesis_buckling(link: Link, beam: Beam, heights: Array) -> float:
-    """Eq. 3.38 [N] for the smallest section of the designed part as one solid, rounded down to whole centimetres as in the thesis."""
+    """Eq. 3.38 [N] for the designed part's smallest section, one solid rounded down to whole centimetres as in the thesis."""
     first, last = (round(share * beam.slices) for share in link.designed)
     smallest = float(heights[first : last + 1].min())
     rounded = np.floor(smallest * 100.0 + 1e-9) / 100.0 or smallest
@@ -268,34 +277,35 @@ def thesis_buckling(link: Link, beam: Beam, heights: Array) -> float:
     return euler_load(beam.material.elastic_modulus, wide * narrow**3 / 12.0, beam.length)
 
 
-def convergence_of_slices(task: LinkDesign, slices: Sequence[int]) -> Array:
+def convergence_of_slices(design: LinkDesign, slices: Sequence[int]) -> Array:
     """(slices, mass [kg]) of the same design with other numbers of slices, (m, 2) (figure 3-14)."""
     found = []
     for n in slices:
-        beam = replace(task.beam, slices=n)
-        if task.thesis is not None:
-            load = _load_of(task)
-            found.append(_by_thesis(beam, load, task.limits, task.task).mass)
+        beam = replace(design.beam, slices=n)
+        if design.thesis is not None:
+            found.append(_by_thesis(beam, _load_of(design), design.limits, design.task).mass)
         else:
-            found.append(least_mass(beam, task.cases, task.limits, own_mass=task.task.own_mass).mass)
+            found.append(least_mass(beam, design.cases, design.limits, own_mass=design.task.own_mass).mass)
     return np.stack([np.asarray(slices, dtype=float), found], axis=-1)
 
 
 def convergence_of_elements(design: LinkDesign, elements: Sequence[int]) -> dict[str, Array]:
     """(elements, deflection [m]) of each model, (m, 2) (figures 3-18 and 3-20); the plate has two elements over its height."""
     case = design.cases.at([design.worst])
-    found = {}
+    found: dict[str, Array] = {}
     if case.clamp[0] > 0.0:
         return found
-    models = {
-        "Euler-Bernoulli beam, one height an element": lambda n: solve_beam(design.beam, design.heights, case, n, prismatic=True),
-        "Euler-Bernoulli beam": lambda n: solve_beam(design.beam, design.heights, case, n),
-        "Timoshenko beam": lambda n: solve_beam(design.beam, design.heights, case, n, "timoshenko"),
-    }
-    if design.beam.support == "cantilever":
-        models["plane stress"] = lambda n: solve_plate(design.beam, design.heights, case, max(n // 2, 1), 2)
-    for name, model in models.items():
-        found[name] = np.array([(n, model(n).deflection) for n in elements])
+    H, beam = design.heights, design.beam
+
+    def deflection_of(name: str, n: int) -> float:
+        if name == "plane stress":
+            return solve_plate(beam, H, case, max(n // 2, 1), 2).deflection
+        theory: Theory = "timoshenko" if name.startswith("Timoshenko") else "euler-bernoulli"
+        return solve_beam(beam, H, case, n, theory, prismatic=name.endswith("element")).deflection
+
+    names = ["Euler-Bernoulli beam, one height an element", "Euler-Bernoulli beam", "Timoshenko beam"]
+    for name in names + (["plane stress"] if beam.support == "cantilever" else []):
+        found[name] = np.array([(n, deflection_of(name, n)) for n in elements])
     return found
 
 
@@ -390,7 +400,9 @@ def _notes(
             "table 2-8 gives -440.9 to 935.8 N along the link and 85.0 to 176.0 N across it; --load moves takes those of moves"
         )
     else:
-        notes.append("the loads are those of the moves given; what the boom does besides, and holding elsewhere, is not in them")
+        notes.append(
+            "the loads are those of the moves given; what the boom does besides, and holding elsewhere, is not in them"
+        )
     if link.fittings is None:
         notes.append("no fittings are known of this link: its new body is that of the plates alone, without pins and bosses")
     elif link.fittings_origin is not None:
@@ -403,8 +415,11 @@ def _notes(
     required = task.safety_factor * pressed(cases)
     if required > 0.0 and tapered < required * (1.0 - 1e-5):
         notes.append(
-            f"buckling: the tapered column holds {tapered:.0f} N, below {task.safety_factor:g} times the end load of {pressed(cases):.0f} N"
+            f"buckling: the tapered column holds {tapered:.0f} N, below {task.safety_factor:g} times the end load of "
+            f"{pressed(cases):.0f} N"
         )
     if old is not None:
-        notes.append("the thesis's method freezes the moments of its first stage and leaves out shear: its own beam deflects more")
+        notes.append(
+            "the thesis's method freezes the moments of its first stage and leaves out shear: its own beam deflects more"
+        )
     return notes

@@ -161,6 +161,15 @@ def _place(target: Target) -> Array:
     return checked("tip target", target.position)
 
 
+def plan_each_profile(boom: Boom, start: Target, goal: Target) -> list[Trajectory]:
+    """The move in the least time of each profile, as samples.
+
+    Raises:
+        InputError, InfeasibleError: as `plan`.
+    """
+    return [plan(boom, start, goal, profile=profile).trajectory for profile in Profile]
+
+
 def check(
     boom: Boom,
     trajectory: Trajectory,

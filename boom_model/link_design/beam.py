@@ -115,9 +115,9 @@ class LoadCases:
     def count(self) -> int:
         return len(self.end_force)
 
-    def at(self, index: "int | Array | slice | list[int]") -> "LoadCases":
-        """Some of the cases."""
-        pick = np.atleast_1d(np.arange(self.count)[index])
+    def at(self, index: ArrayLike) -> "LoadCases":
+        """Some of the cases, by their numbers."""
+        pick = np.atleast_1d(np.asarray(index, dtype=int))
         return LoadCases(*(read_only(a[pick]) for a in (self.end_force, self.end_moment, self.acceleration, self.clamp)))
 
 
@@ -160,7 +160,7 @@ def internal_forces(beam: Beam, H: ArrayLike, cases: LoadCases) -> Forces:
 
 
 def added_by_height(beam: Beam, cases: LoadCases, weights: Forces) -> Array:
-    """d/dH_j of sum_i (weights.N N + weights.V V + weights.M M)_i over the cases, (n + 1,): the adjoint of `internal_forces`."""
+    """d/dH_j (n + 1,) of sum_i (weights.N N + weights.V V + weights.M M)_i over all cases, `internal_forces` in reverse."""
     x, L = beam.stations, beam.length
     wN, wV, wM = (np.where(x < cases.clamp[:, None] - 1e-12, 0.0, w) for w in weights)
     from_moment = before_each(wM) * x - before_each(wM * x)
@@ -197,7 +197,7 @@ def stress_height(beam: Beam, forces: Forces, limit: float) -> Array:
     s = limit * beam.width
     quadratic, linear, constant = N**2 + 3.0 * V**2, 12.0 * N * M, 36.0 * M**2
     bound = N + np.sqrt(3.0) * V
-    H = (bound + np.sqrt(bound**2 + 24.0 * s * M)) / (2.0 * s)
+    H: Array = (bound + np.sqrt(bound**2 + 24.0 * s * M)) / (2.0 * s)
     for _ in range(60):
         value = s**2 * H**4 - (quadratic * H**2 + linear * H + constant)
         slope = 4.0 * s**2 * H**3 - (2.0 * quadratic * H + linear)
@@ -232,7 +232,9 @@ def deflection(beam: Beam, H: ArrayLike, forces: Forces, *, shear: bool = False)
     """
     H = _heights(beam, H)
     total: Array = (deflection_coefficients(beam, forces.M) / H**3).sum(axis=-1)
-    return total + (shear_coefficients(beam, forces.V) / H).sum(axis=-1) if shear else total
+    if shear:
+        total = total + (shear_coefficients(beam, forces.V) / H).sum(axis=-1)
+    return total
 
 
 def _heights(beam: Beam, H: ArrayLike) -> Array:

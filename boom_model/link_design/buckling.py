@@ -12,6 +12,7 @@ degree, and its gradient bounds it from above everywhere. In the plane I = w H^3
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from boom_model.arrays import Array
 from boom_model.link_design.beam import Beam, before_each, beyond_each, outboard_share
@@ -28,6 +29,7 @@ _ELEMENTS = 60
 def euler_load(elastic_modulus: float, second_moment: float, length: float, factor: float = THESIS_LENGTH_FACTOR) -> float:
     """P_cr = pi^2 E I / (K L)^2 [N] of a prism (thesis, eq. 3.38)."""
     return float(np.pi**2 * elastic_modulus * second_moment / (factor * length) ** 2)
+
 
 _MODES = 16
 
@@ -46,8 +48,8 @@ class Buckling(NamedTuple):
 def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane = "across") -> Buckling:
     """Critical end load of the tapered column under its own body force, by Hermite elements.
 
-    Across the arm's plane a cantilever is held at its root and guided at its end, as the thesis's K = 0.7 has it, and a strut is
-    pinned at both; in the plane a cantilever's end is free.
+    Across the arm's plane a cantilever is held at its root and guided at its end, as the thesis's K = 0.7 has it, and a strut
+    is pinned at both; in the plane a cantilever's end is free.
 
     Args:
         H: (n + 1,) heights [m].
@@ -74,7 +76,7 @@ def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane 
 
     def to_stations(values: Array) -> Array:
         """The adjoint of `at_points`, with the weights of the integral: (..., n, 3) to (..., n + 1)."""
-        total = np.zeros((*values.shape[:-2], n + 1))
+        total: Array = np.zeros((*values.shape[:-2], n + 1))
         total[..., :-1] += values @ (weights * (1.0 - share))
         total[..., 1:] += values @ (weights * share)
         return total
@@ -106,7 +108,7 @@ def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane 
     return Buckling(float(values[0]), coupled[0], curved)
 
 
-def _free(beam: Beam, elements: int, plane: Plane) -> Array:
+def _free(beam: Beam, elements: int, plane: Plane) -> NDArray[np.intp]:
     """Degrees of freedom (deflection and slope at each node) that the supports leave."""
     free = np.ones(2 * elements + 2, dtype=bool)
     free[0] = False

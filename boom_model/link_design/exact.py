@@ -1,4 +1,4 @@
-"""The least mass of a link under stress, deflection, buckling, least and largest height and taper, by its optimality conditions.
+"""The least mass of a link under stress, deflection, buckling, heights and taper, by its optimality conditions.
 
 With moments frozen, as Appendix D freezes those of its stage 1, a link has least mass where
 
@@ -70,7 +70,7 @@ class Limits:
             raise InputError(f"minimum height is {self.min_height:g} m; it must be at least 0 m")
         if self.max_height is not None and self.min_height >= self.max_height:
             raise InputError(
-                f"minimum height {self.min_height:g} m is not below the maximum height of {self.max_height:g} m: no height is left"
+                f"minimum height {self.min_height:g} m is not below the maximum of {self.max_height:g} m: no height is left"
             )
 
 
@@ -125,12 +125,39 @@ def least_mass(beam: Beam, cases: LoadCases, limits: Limits, *, own_mass: bool =
     """
     some = _first_guess(beam, cases, limits)
     while True:
-        design = _least_mass(beam, cases.at(some), limits, own_mass, shear and own_mass)
+        design = _upright(_least_mass(beam, cases.at(some), limits, own_mass, shear and own_mass), own_mass)
         more = np.setdiff1d(_broken(design, cases), some)
         if not more.size:
             governing = tuple(int(some[k]) for k in design.governing)
-            return replace(design, cases=cases, governing=governing)
+            return replace(design, cases=cases, limits=limits, governing=governing)
         some = np.union1d(some, more)
+
+
+def _upright(design: Design, own_mass: bool) -> Design:
+    """The design, with a least height that keeps it from buckling in the arm's plane where its taper ends would.
+
+    In the plane the critical load is not concave in the heights: what holds it here is safe, not least. The bound stays that of
+    the design without, and so does the gap tell.
+    """
+    beam, limits = design.beam, design.limits
+    needed = (limits.buckling_factor or 0.0) * pressed(design.cases)
+    bound, first = design.lower_bound, limits
+
+    def load(H: Array) -> float:
+        return critical_load(beam, H, _pressing(beam, design.cases), "in-plane").load
+
+    while needed > 0.0 and load(design.heights) < needed * (1.0 - 1e-6):
+        low, high = limits.min_height, limits.max_height or 10.0 * float(design.heights.max())
+        if load(np.maximum(design.heights, high)) < needed:
+            raise InfeasibleError(
+                f"at the maximum height of {high:.4g} m the link buckles in the arm's plane below {needed:.0f} N"
+            )
+        for _ in range(20):
+            middle = (low + high) / 2.0
+            low, high = (low, middle) if load(np.maximum(design.heights, middle)) >= needed else (middle, high)
+        limits = replace(limits, min_height=min(1.01 * high, limits.max_height or np.inf))
+        design = replace(_least_mass(beam, design.cases, limits, own_mass, design.shear), lower_bound=bound)
+    return replace(design, limits=first)
 
 
 def _first_guess(beam: Beam, cases: LoadCases, limits: Limits) -> Array:
@@ -163,7 +190,7 @@ def _least_mass(beam: Beam, cases: LoadCases, limits: Limits, own_mass: bool, sh
     price = beam.material.density * beam.width * beam.weights
     search = _Search(beam, cases, limits, price, shear)
     H, found = before, None
-    for repeat in range(1, _MOST_REPEATS + 1):  # noqa: B007
+    for repeat in range(1, _MOST_REPEATS + 1):
         found = search.solve(H, forces, price)
         change = abs(mass(beam, found.heights) - mass(beam, H)) / mass(beam, H)
         H = found.heights
@@ -174,14 +201,16 @@ def _least_mass(beam: Beam, cases: LoadCases, limits: Limits, own_mass: bool, sh
         if repeat > 1 and change <= max(_AGREED, (found.value - found.lower_bound) / found.value):
             break
     else:
-        raise InfeasibleError(f"after {_MOST_REPEATS} repeats the link's mass and its own load do not agree: it does not carry itself")
+        raise InfeasibleError(
+            f"after {_MOST_REPEATS} repeats the link's mass and its own load do not agree: it does not carry itself"
+        )
     assert found is not None
     bound: float | None = found.lower_bound
     if own_mass:
         bound = _lower_bound(search, H, forces, found)
     stressed = von_mises(beam, H, forces)
     at_stress = search.low > np.maximum(limits.min_height, 0.0)
-    tight = H <= search.low * (1.0 + 1e-5)
+    tight = search.low * (1.0 + 1e-5) >= H
     shares = {"stress": float((tight & at_stress).mean()), "least height": float((tight & ~at_stress).mean())}
     return Design(
         beam=beam,
@@ -221,14 +250,15 @@ def stress_only(beam: Beam, cases: LoadCases, limits: Limits) -> Array:
         if (needed > top).any():
             i = int(np.argmax(needed))
             raise InfeasibleError(
-                f"at x = {beam.stations[i]:.4g} m the stress needs a height of {needed[i]:.4g} m, above the maximum of {top:g} m"
+                f"at x = {beam.stations[i]:.4g} m the stress needs {needed[i]:.4g} m of height, above the maximum of {top:g} m"
             )
         if np.abs(needed - H).max() <= 1e-14 * max(float(needed.max()), 1e-300):
             break
         H = needed
     if not needed.max() > 0.0:
         raise InfeasibleError("nothing loads the link and there is no minimum height: its least mass is 0")
-    return np.maximum(needed, 1e-9 * float(needed.max()))  # a free end of no load has no height, and no stiffness
+    found: Array = np.maximum(needed, 1e-9 * float(needed.max()))  # an end without load has no height, but must have stiffness
+    return found
 
 
 def pressed(cases: LoadCases) -> float:
@@ -341,9 +371,9 @@ def _lower_bound(search: _Search, H: Array, forces: Forces, found: Optimum) -> f
     """A mass that no link goes below, its own mass and all; None where none is proven.
 
     Looks at those load cases alone whose own load adds to the end's, which is no more than leaving constraints out; none is
-    proven where others decide. Their forces at least are those of the stress-only beam: the frozen problem bounds the mass. The Lagrangian in log H at the
-    multipliers found does so too, and closely, where neither buckling nor taper decides; its gradient, which is nearly 0,
-    is followed to the ends of the range of heights.
+    proven where others decide. Their forces at least are those of the stress-only beam: the frozen problem bounds the mass. The
+    Lagrangian in log H at the multipliers found does so too, and closely, where neither buckling nor taper decides; its
+    gradient, which is nearly 0, is followed to the ends of the range of heights.
     """
     beam, cases, limits = search.beam, search.cases, search.limits
     adding = _adding(beam, cases)

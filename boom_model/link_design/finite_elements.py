@@ -1,7 +1,7 @@
 """A link by finite elements, to hold a design against: beams after Euler-Bernoulli and Timoshenko, and the contour as a plate.
 
-Assembly and elements are scikit-fem's, and this file its only importer; of the design it takes the heights, the load case and the
-material, none of its formulas. The thesis's counterparts: ANSYS beam 188 (figure 3-18) and hexahedra (figure 3-20).
+Assembly and elements are scikit-fem's, and this file its only importer; of the design it takes the heights, the load case and
+the material, none of its formulas. The thesis's counterparts: ANSYS beam 188 (figure 3-18) and hexahedra (figure 3-20).
 """
 
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from boom_model.errors import InputError
 from boom_model.link_design.beam import SHEAR_FACTOR, Beam, LoadCases
 
 Theory = Literal["euler-bernoulli", "timoshenko"]
+
 
 @dataclass(frozen=True, eq=False)
 class Solution:
@@ -39,7 +40,17 @@ def solve_beam(
         prismatic: whether an element has the height of its middle all along, as those of the thesis's figure 3-18 have.
     """
     from scipy.sparse import bmat
-    from skfem import Basis, BilinearForm, ElementLineHermite, ElementLineP1, ElementLineP2, LinearForm, MeshLine, condense, solve
+    from skfem import (
+        Basis,
+        BilinearForm,
+        ElementLineHermite,
+        ElementLineP1,
+        ElementLineP2,
+        LinearForm,
+        MeshLine,
+        condense,
+        solve,
+    )
 
     _one(case)
     E, G, w = beam.material.elastic_modulus, beam.material.shear_modulus, beam.width
@@ -94,8 +105,9 @@ def solve_beam(
                 [
                     BilinearForm(lambda u, s, p: -stiff_in_shear * height(p.x[0]) * u.grad[0] * s).assemble(lift, turn),
                     BilinearForm(
-                        lambda r, s, p: E * w * height(p.x[0]) ** 3 / 12.0 * r.grad[0] * s.grad[0]
-                        + stiff_in_shear * height(p.x[0]) * r * s
+                        lambda r, s, p: (
+                            E * w * height(p.x[0]) ** 3 / 12.0 * r.grad[0] * s.grad[0] + stiff_in_shear * height(p.x[0]) * r * s
+                        )
                     ).assemble(turn),
                 ],
             ],
@@ -152,7 +164,9 @@ def solve_plate(beam: Beam, H: Array, case: LoadCases, along: int, across: int) 
     E, nu, w = beam.material.elastic_modulus, beam.material.poisson_ratio, beam.width
     square = MeshQuad.init_tensor(np.linspace(0.0, beam.length, along + 1), np.linspace(-0.5, 0.5, across + 1))
     x, y = square.p
-    mesh = MeshQuad(np.stack([x, y * np.interp(x, beam.stations, H)]), square.t).with_boundaries({"root": lambda x: x[0] < 1e-9, "end": lambda x: x[0] > beam.length - 1e-9})
+    mesh = MeshQuad(np.stack([x, y * np.interp(x, beam.stations, H)]), square.t).with_boundaries(
+        {"root": lambda x: x[0] < 1e-9, "end": lambda x: x[0] > beam.length - 1e-9}
+    )
     element = ElementVector(ElementQuad2())
     basis = Basis(mesh, element, intorder=6)
     shear, first = E / (2.0 * (1.0 + nu)), E * nu / (1.0 - nu**2)
@@ -163,9 +177,7 @@ def solve_plate(beam: Beam, H: Array, case: LoadCases, along: int, across: int) 
 
     edge = FacetBasis(mesh, element, facets="end", intorder=6)
     h, (fx, fy), m = float(H[-1]), case.end_force[0], case.end_moment[0]
-    load = LinearForm(
-        lambda v, p: _body(beam, case, 0, p.x[0]) * v[0] + _body(beam, case, 1, p.x[0]) * v[1]
-    ).assemble(basis)
+    load = LinearForm(lambda v, p: _body(beam, case, 0, p.x[0]) * v[0] + _body(beam, case, 1, p.x[0]) * v[1]).assemble(basis)
     load += LinearForm(lambda v, p: (fx / h - m * p.x[1] * 12.0 / h**3) * v[0] + fy / h * v[1]).assemble(edge)
     u = solve(*condense(BilinearForm(form).assemble(basis), load, D=basis.get_dofs("root")))
     ends = edge.interpolate(u)
@@ -184,7 +196,7 @@ def solve_plate(beam: Beam, H: Array, case: LoadCases, along: int, across: int) 
 def _outline(beam: Beam, H: Array):  # type: ignore[no-untyped-def]
     def on(x: Array) -> Array:
         inside = (x[0] > 1e-9) & (x[0] < beam.length - 1e-9)
-        return inside & (np.abs(x[1]) > 0.25 * np.interp(x[0], beam.stations, H))
+        return np.asarray(inside & (np.abs(x[1]) > 0.25 * np.interp(x[0], beam.stations, H)))
 
     return on
 
@@ -217,4 +229,4 @@ def _shear(beam: Beam, case: LoadCases, H: Array, points: Array) -> Array:
     if beam.support == "pinned":
         moment = case.end_moment[0] + case.end_force[0, 1] * beam.length + cumulative_simpson(load * x, x=x)[-1]
         V = V - moment / beam.length
-    return np.interp(points, x, V)
+    return np.asarray(np.interp(points, x, V))

@@ -5,7 +5,8 @@
 
 with C >= 0 and P concave and of the first degree. Multipliers z fulfil the optimality conditions (Karush, Kuhn, Tucker) up to
 the gap. Without taper and P these say that a station is as high as its lower bound asks or as (3 z . C_i / a_i)^(1/4): material
-goes where it takes most off the deflections. Method: Mehrotra's predictor and corrector with slacks (Nocedal and Wright, Numerical Optimization, section 19.3); the
+goes where it takes most off the deflections. Method: Mehrotra's predictor and corrector with slacks (Nocedal and Wright,
+Numerical Optimization, section 19.3); the
 Newton matrix is tridiagonal plus a few columns. The deflections enter as 1 - (sum_i C_ki / H_i^3)^(-1/3) <= 0:
 the same set, but of the first degree in H, which Newton's method follows in large steps.
 """
@@ -96,7 +97,7 @@ def solve(problem: Problem) -> Optimum:
     z = 0.1 * float(p.cost @ x) / s.size / s
     best: tuple[float, Array, Multipliers] | None = None
     lower_bound, gap, improved = -np.inf, np.inf, 0
-    for iteration in range(_MOST_ITERATIONS):  # noqa: B007
+    for iteration in range(_MOST_ITERATIONS):
         capacity = _capacity(p, x)
         f = _values(p, x, capacity)
         s = np.maximum(s, -f)  # a slack that the constraint has is no error

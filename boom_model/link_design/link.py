@@ -101,7 +101,9 @@ def link_body(link: Link, beam: Beam, H: Array) -> Body:
     parts = [_moments(m, x, dx**2 / 12.0, h**2 / 12.0, zz)]
     if link.cross_plates:
         gap = max(link.spacing - thickness, 0.0)
-        at = (np.array(link.designed[0]) + (np.arange(link.cross_plates) + 0.5) / link.cross_plates * np.ptp(link.designed)) * beam.length
+        at = (
+            np.array(link.designed[0]) + (np.arange(link.cross_plates) + 0.5) / link.cross_plates * np.ptp(link.designed)
+        ) * beam.length
         high = np.interp(at, beam.stations, H)
         parts.append(_moments(rho * gap * thickness * high, at, thickness**2 / 12.0, high**2 / 12.0, gap**2 / 12.0))
     if link.fittings is not None:
@@ -123,7 +125,7 @@ def with_body(boom: Boom, name: str, body: Body) -> Boom:
     return replace(boom, bodies=bodies)
 
 
-def _moments(m: Array, x: Array, xx: Any, yy: Any, zz: Any) -> Array:
+def _moments(m: Any, x: Any, xx: Any, yy: Any, zz: Any) -> Array:
     """int (1, r)(1, r)^T dm of bars at (x, 0, 0) with second moments of their own: (4, 4)."""
     P = np.zeros((4, 4))
     P[0, 0] = m.sum()

@@ -187,4 +187,6 @@ def _deflection_stage(start: Array, c: Array, limit: float, step: float) -> Arra
             return np.bincount(order[: last + 1] // levels, minlength=start.size).astype(float)
         levels *= 2
         if levels > MOST_STEPS:
-            raise InfeasibleError(f"a deflection of {limit:g} m needs more than {MOST_STEPS * step:g} m of height: no such link")
+            raise InfeasibleError(
+                f"a deflection of {limit:g} m needs more than {MOST_STEPS * step:g} m of height: no such link"
+            )
