@@ -8,12 +8,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from boom_model import Boom, InputError, body_motion, inverse_dynamics
+from boom_model import Boom, InputError, body_motion, inverse_dynamics, transmission_angle
 from boom_model.arrays import Array, read_only
 from boom_model.boom import LIMIT_TOLERANCE
 from boom_model.dynamics import PayloadAs
 from boom_model.link_design import Link, LoadCases, ThesisLoad
 from planner.trajectory import Trajectory
+
+_FLAT = 1e-6
+"""Transmission angle [rad] below which a linkage is flat."""
 
 
 def link_cases(
@@ -25,19 +28,19 @@ def link_cases(
     frame 7; the extension bears the tool at the wrist, and is held at its housing's mouth, `clamp` from its root.
 
     Raises:
-        InputError: there is no motion, or a linkage is flat and its pin forces are not finite; names the instant.
+        InputError: there is no motion, loads are not finite, or a linkage is flat; names the instant.
     """
     if not trajectories:
         raise InputError("there is no motion to take a link's loads from")
+    for i, trajectory in enumerate(trajectories):
+        flat = transmission_angle(trajectory.q) < _FLAT
+        if link.name != "extension" and flat.any():
+            at = trajectory.t[int(np.argmax(flat))]
+            raise InputError(f"motion {i + 1}, t = {at:g} s: the linkage is flat, where pin forces have no bound")
     parts = [_of_motion(boom, link, trajectory, payload_as) for trajectory in trajectories]
     instants = [np.stack([np.full(t.t.size, i), t.t], axis=-1) for i, t in enumerate(trajectories)]
     force, moment, acceleration, clamp = (np.concatenate(each) for each in zip(*parts, strict=True))
-    when = np.concatenate(instants)
-    finite = np.isfinite(force).all(axis=1)
-    if not finite.all():
-        motion, t = when[np.argmin(finite)]
-        raise InputError(f"motion {motion:.0f}, t = {t:g} s: the pin forces are not finite, for the linkage is flat")
-    return LoadCases.of(force, acceleration, moment, clamp), read_only(when)
+    return LoadCases.of(force, acceleration, moment, clamp), read_only(np.concatenate(instants))
 
 
 def largest_components(cases: LoadCases) -> LoadCases:

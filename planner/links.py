@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from boom_model import Body, Boom, InputError, inverse_dynamics
+from boom_model import JOINTS, Body, Boom, InputError, inverse_dynamics, transmission_angle
 from boom_model.arrays import Array, read_only
 from boom_model.catalogue import Catalogue
 from boom_model.drives import Drive
@@ -253,7 +253,7 @@ def design_link(boom: Boom, task: Task, trajectories: Sequence[Trajectory]) -> L
         trajectories=tuple(trajectories),
         torques=(torques[0], torques[1]),
         motors=tuple(_motors(boom, after, DRIVEN_BY[link.name], trajectories, task.payload_as)),
-        notes=tuple(_notes(task, link, beam, cases, limits, tapered, old)),
+        notes=tuple(_notes(boom, task, link, beam, cases, trajectories, tapered, old)),
     )
 
 
@@ -369,7 +369,6 @@ def _motors(
     drive = before.drives[joint]
     if drive is None:
         return []
-    from boom_model import JOINTS
 
     def judged(boom: Boom, motor: Drive) -> tuple[Verdict, float | None]:
         drives = tuple(motor if i == joint else d for i, d in enumerate(boom.drives))
@@ -391,7 +390,14 @@ def _motors(
 
 
 def _notes(
-    task: Task, link: Link, beam: Beam, cases: LoadCases, limits: Limits, tapered: float, old: ThesisDesign | None
+    boom: Boom,
+    task: Task,
+    link: Link,
+    beam: Beam,
+    cases: LoadCases,
+    trajectories: Sequence[Trajectory],
+    tapered: float,
+    old: ThesisDesign | None,
 ) -> list[str]:
     notes = []
     if task.load == LoadFrom.THESIS:
@@ -403,6 +409,11 @@ def _notes(
         notes.append(
             "the loads are those of the moves given; what the boom does besides, and holding elsewhere, is not in them"
         )
+        least = min(float(transmission_angle(t.q).min()) for t in trajectories)
+        if link.name != "extension" and least < boom.limits.transmission:
+            notes.append(
+                f"the linkage comes within {np.degrees(least):.2g} deg of flat: the loads there are those of its geometry"
+            )
     if link.fittings is None:
         notes.append("no fittings are known of this link: its new body is that of the plates alone, without pins and bosses")
     elif link.fittings_origin is not None:

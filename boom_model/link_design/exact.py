@@ -100,7 +100,7 @@ class Design:
     pressed: float
     """The largest end load along the link [N], compression positive"""
     lower_bound: float | None
-    """[kg] that no link under these limits can go below; None where none is proven"""
+    """[kg] that no link under these limits can go below; None where none is proven, or none within a tenth"""
     governing: tuple[int, ...]
     """The load cases whose deflection is at its limit"""
     shares: dict[str, float]
@@ -208,6 +208,7 @@ def _least_mass(beam: Beam, cases: LoadCases, limits: Limits, own_mass: bool, sh
     bound: float | None = found.lower_bound
     if own_mass:
         bound = _lower_bound(search, H, forces, found)
+        bound = bound if bound is not None and bound >= 0.9 * mass(beam, H) else None
     stressed = von_mises(beam, H, forces)
     at_stress = search.low > np.maximum(limits.min_height, 0.0)
     tight = search.low * (1.0 + 1e-5) >= H
@@ -370,15 +371,14 @@ class _Search:
 def _lower_bound(search: _Search, H: Array, forces: Forces, found: Optimum) -> float | None:
     """A mass that no link goes below, its own mass and all; None where none is proven.
 
-    Looks at those load cases alone whose own load adds to the end's, which is no more than leaving constraints out; none is
-    proven where others decide. Their forces at least are those of the stress-only beam: the frozen problem bounds the mass. The
-    Lagrangian in log H at the multipliers found does so too, and closely, where neither buckling nor taper decides; its
-    gradient, which is nearly 0, is followed to the ends of the range of heights.
+    Looks at those load cases alone whose own load adds to the end's, which is no more than leaving constraints out. Their forces
+    at least are those of the stress-only beam: the frozen problem bounds the mass. The Lagrangian in log H at the multipliers
+    found does so too, and closely, where neither buckling nor taper decides; its gradient, which is nearly 0, is followed to
+    the ends of the range of heights.
     """
     beam, cases, limits = search.beam, search.cases, search.limits
     adding = _adding(beam, cases)
-    used, _ = search.weights(H, forces, found)
-    if not adding[used].all():
+    if not adding.any():
         return None
     some = cases.at(np.flatnonzero(adding))
     least = stress_only(beam, some, limits)
@@ -386,10 +386,17 @@ def _lower_bound(search: _Search, H: Array, forces: Forces, found: Optimum) -> f
     bound = frozen.solve(least, internal_forces(beam, least, some), search.mass_per_height).lower_bound
     if limits.max_taper is not None:
         return bound
+    # A multiplier that is left out, as those of the other cases are, bounds the mass all the same.
+    counts = adding[stress_height(beam, forces, limits.stress).argmax(axis=0)]
+    kept = found.multipliers._replace(
+        lower=np.where(counts, found.multipliers.lower, 0.0),
+        deflections=np.where(adding[search.deflecting], found.multipliers.deflections, 0.0),
+    )
+    found = replace(found, multipliers=kept)
     price = search.price(H, forces, found)
-    stress_price = np.where(search.low > limits.min_height, found.multipliers.lower, 0.0)
+    stress_price = np.where(search.low > limits.min_height, kept.lower, 0.0)
     C = search.deflections(H, forces)[0][search.deflecting]
-    z = found.multipliers.deflections
+    z = kept.deflections
     gradient = H * (price - 3.0 * (z @ C) / H**4 - stress_price)
     top = np.full_like(H, 4.0 * H.max() if limits.max_height is None else limits.max_height)
     down, up = np.log(np.minimum(least, H) / H), np.log(top / H)
@@ -406,7 +413,8 @@ def _adding(beam: Beam, cases: LoadCases) -> Array:
         return np.zeros(cases.count, dtype=bool)
     end, a = cases.end_force, cases.acceleration
     far = a[..., 0] + a[..., 1] * beam.length
-    against = (end * a[..., 0] <= 0.0) & (end * far <= 0.0)
+    rounding = 1e-12 * np.abs(end).max() * max(float(np.abs(a).max()), 1e-300)
+    against = (end * a[..., 0] <= rounding) & (end * far <= rounding)
     turned = cases.end_moment * end[:, 1] >= 0.0
-    steady = (a[..., 0] * far >= 0.0).all(axis=1)
+    steady = (a[..., 0] * far >= -1e-12 * np.abs(a).max() ** 2).all(axis=1)
     return np.asarray(against.all(axis=1) & turned & steady)
