@@ -382,6 +382,11 @@ def check(
 @click.option("--max-height", type=float, metavar="M", help="Of the plates; else free.")
 @click.option("--max-taper", type=float, metavar="RATIO", help="Largest change of height over length; else free.")
 @click.option("--frozen", is_flag=True, help="Exact method: freeze the moments as the thesis does, and leave out shear.")
+@click.option(
+    "--shear/--no-shear",
+    default=None,
+    help="Exact method: whether shear counts in the deflection; else for the loads of moves, not for the thesis's.",
+)
 @click.option("--no-buckling", is_flag=True, help="Exact method: do not hold the safety factor against buckling.")
 @click.option("--slices", type=int, default=1000, show_default=True, help="Along the link.")
 @click.option("--step", type=float, default=1e-4, show_default=True, metavar="M", help="Thesis's method: its delta-H.")
@@ -410,6 +415,7 @@ def link(
     max_height: float | None,
     max_taper: float | None,
     frozen: bool,
+    shear: bool | None,
     no_buckling: bool,
     slices: int,
     step: float,
@@ -456,6 +462,7 @@ def link(
         max_taper=max_taper,
         thickness=thickness,
         own_mass=not frozen,
+        shear=shear,
         buckling=not no_buckling,
         largest_components=largest_components,
         payload_as=payload_as,
@@ -512,7 +519,7 @@ def link(
 @cli.command()
 @json_option
 def validate(as_json: bool) -> int:
-    """The thesis's tables 2-5 to 2-8 and section 3.5's loads, row by row, against this model."""
+    """The thesis's tables 2-5 to 2-8 and 3-2 and its sections 3.5 and 3.6, row by row, against this model."""
     from planner.validation import validate as validate_model
 
     rows = validate_model(Boom.load())

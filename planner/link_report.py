@@ -38,6 +38,9 @@ def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:
         "end_load_N": design.pressed,
         "lower_bound_kg": None if exact is None else exact.lower_bound,
         "gap": None if exact is None else exact.gap,
+        "equal_constraints": None
+        if design.equal_constraints is None
+        else dict(zip(("thesis_kg", "exact_kg"), design.equal_constraints, strict=True)),
         "load_cases": design.cases.count,
         "governing": [] if exact is None or design.instants is None else design.instants[list(exact.governing)].tolist(),
         "checks": [
@@ -115,6 +118,9 @@ def rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
             else f"{exact.lower_bound:.4f} kg, gap {exact.gap:.1g}"
         )
         found.append(("lower bound of the mass", "-", gap, "-"))
+    if design.equal_constraints is not None:
+        theirs, ours = design.equal_constraints
+        found.append(("plates at the thesis's constraints", "-", f"{theirs:.4f} kg thesis, {ours:.4f} kg exact", "-"))
     found += [
         (f"check: {c.model}, {c.elements} elements", "-", f"{1e3 * c.deflection:.3f} mm, {1e-6 * c.stress:.1f} MPa", "-")
         for c in design.checks

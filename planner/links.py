@@ -81,6 +81,8 @@ class Task:
     """Of one plate [m]; None is the link's own"""
     own_mass: bool = True
     """See `least_mass`"""
+    shear: bool | None = None
+    """Whether shear counts in the deflection of the exact method; None is for the loads of moves, not for the thesis's"""
     buckling: bool = True
     """Whether the exact method holds the safety factor against buckling"""
     largest_components: bool = False
@@ -122,6 +124,8 @@ class LinkDesign:
     beam: Beam
     limits: Limits
     cases: LoadCases
+    equal_constraints: tuple[float, float] | None
+    """Masses of the plates by the thesis's method and the exact one under the same constraints, the thesis's [kg]"""
     instants: Array | None
     """(k, 2) motion and time [s] of each case; None for a load that is no instant"""
     heights: Array
@@ -215,7 +219,7 @@ def design_link(boom: Boom, task: Task, trajectories: Sequence[Trajectory]) -> L
         old = _by_thesis(beam, old_load, limits, task)
         heights, stress_heights = old.heights, old.stress_heights
     else:
-        exact = least_mass(beam, cases, limits, own_mass=task.own_mass)
+        exact = least_mass(beam, cases, limits, own_mass=task.own_mass, shear=_with_shear(task))
         heights, stress_heights = exact.heights, exact.stress_heights
     forces = internal_forces(beam, heights, cases)
     bent = deflection(beam, heights, forces, shear=True)
@@ -230,6 +234,7 @@ def design_link(boom: Boom, task: Task, trajectories: Sequence[Trajectory]) -> L
         beam=beam,
         limits=limits,
         cases=cases,
+        equal_constraints=_equals(beam, cases, limits, task, old_load),
         instants=instants,
         heights=heights,
         stress_heights=stress_heights,
@@ -253,7 +258,7 @@ def design_link(boom: Boom, task: Task, trajectories: Sequence[Trajectory]) -> L
         trajectories=tuple(trajectories),
         torques=(torques[0], torques[1]),
         motors=tuple(_motors(boom, after, DRIVEN_BY[link.name], trajectories, task.payload_as)),
-        notes=tuple(_notes(boom, task, link, beam, cases, trajectories, tapered, old)),
+        notes=tuple(_notes(boom, task, link, beam, cases, trajectories, tapered, float(bent[worst]), old)),
     )
 
 
@@ -285,7 +290,11 @@ def convergence_of_slices(design: LinkDesign, slices: Sequence[int]) -> Array:
         if design.thesis is not None:
             found.append(_by_thesis(beam, _load_of(design), design.limits, design.task).mass)
         else:
-            found.append(least_mass(beam, design.cases, design.limits, own_mass=design.task.own_mass).mass)
+            found.append(
+                least_mass(
+                    beam, design.cases, design.limits, own_mass=design.task.own_mass, shear=_with_shear(design.task)
+                ).mass
+            )
     return np.stack([np.asarray(slices, dtype=float), found], axis=-1)
 
 
@@ -321,6 +330,24 @@ def _by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: Task) -> Thes
         if given:
             raise InputError(f"the thesis's method knows no {name}; the exact method does")
     return thesis_design(beam, load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=task.step)
+
+
+def _with_shear(task: Task) -> bool:
+    return task.load == LoadFrom.MOVES if task.shear is None else task.shear
+
+
+def _equals(
+    beam: Beam, cases: LoadCases, limits: Limits, task: Task, old_load: ThesisLoad | None
+) -> tuple[float, float] | None:
+    """Masses [kg] of the thesis's method and of the exact one under the thesis's own constraints; None without such a load.
+
+    Both hold the stress, and the deflection with the moments of the stress-only beam; the exact heights are stepless.
+    """
+    if old_load is None:
+        return None
+    plain = Limits(stress=limits.stress, deflection=limits.deflection)
+    theirs = thesis_design(beam, old_load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=task.step)
+    return theirs.mass, least_mass(beam, cases, plain, own_mass=False).mass
 
 
 def _first(old: ThesisDesign | None, exact: Design | None) -> ThesisDesign | Design:
@@ -397,6 +424,7 @@ def _notes(
     cases: LoadCases,
     trajectories: Sequence[Trajectory],
     tapered: float,
+    bent: float,
     old: ThesisDesign | None,
 ) -> list[str]:
     notes = []
@@ -423,6 +451,10 @@ def _notes(
     if beam.material.origin.basis != "printed":
         notes.append(f"material {beam.material.name} ({beam.material.origin.basis}): {beam.material.origin.source}")
     notes.append("lateral bending and torsion, fatigue, welds, pin holes and local buckling of a plate's edge are not checked")
+    if bent > task.deflection * (1.0 + 1e-4):
+        notes.append(
+            f"with its own mass and shear it deflects {1e3 * bent:.3f} mm, above its limit; the exact method with --shear holds it"
+        )
     required = task.safety_factor * pressed(cases)
     if required > 0.0 and tapered < required * (1.0 - 1e-5):
         notes.append(
@@ -430,7 +462,5 @@ def _notes(
             f"{pressed(cases):.0f} N"
         )
     if old is not None:
-        notes.append(
-            "the thesis's method freezes the moments of its first stage and leaves out shear: its own beam deflects more"
-        )
+        notes.append("the thesis's method freezes the moments of its first stage and leaves out shear")
     return notes

@@ -10,6 +10,8 @@
     .../limits                the limits beside it; those that do not change with the motion at the move's two ends only
     /report                   the report as Markdown
 
+A designed link's and a reach map's recordings say at their functions what they hold.
+
 The timeline is "t". The linkage comes solved: each body's frame is a child of the mount, because a frame has one parent and
 a closed loop cannot be shown. The solids' lengths are the model's, their thickness is for the eye only.
 """

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from boom_model.arrays import Array, read_only, scalar
+from boom_model.arrays import Array, Mask, read_only, scalar
 from boom_model.errors import InfeasibleError, InputError
 from boom_model.link_design.beam import (
     Beam,
@@ -371,26 +371,33 @@ class _Search:
 def _lower_bound(search: _Search, H: Array, forces: Forces, found: Optimum) -> float | None:
     """A mass that no link goes below, its own mass and all; None where none is proven.
 
-    Looks at those load cases alone whose own load adds to the end's, which is no more than leaving constraints out. Their forces
-    at least are those of the stress-only beam: the frozen problem bounds the mass. The Lagrangian in log H at the multipliers
-    found does so too, and closely, where neither buckling nor taper decides; its gradient, which is nearly 0, is followed to
-    the ends of the range of heights.
+    Looks at those load cases alone whose own load adds to the end's, without what pulls or presses where that does not add: no
+    more than easing constraints. Their forces at least are those of the stress-only beam: the frozen problem bounds the mass.
+    The Lagrangian in log H at the multipliers found does so too, and closely, where neither buckling nor taper decides; its
+    gradient, which is nearly 0, is followed to the ends of the range of heights.
     """
     beam, cases, limits = search.beam, search.cases, search.limits
-    adding = _adding(beam, cases)
-    if not adding.any():
+    along, across = _adding(beam, cases)
+    if not across.any():
         return None
-    some = cases.at(np.flatnonzero(adding))
+    some = cases.at(np.flatnonzero(across))
+    only = along[across, None]
+    some = LoadCases.of(
+        some.end_force * np.where([True, False], only, True),
+        some.acceleration * np.where([True, False], only, True)[..., None],
+        some.end_moment,
+        some.clamp,
+    )
     least = stress_only(beam, some, limits)
     frozen = _Search(beam, some, limits, search.mass_per_height, shear=False)
     bound = frozen.solve(least, internal_forces(beam, least, some), search.mass_per_height).lower_bound
     if limits.max_taper is not None:
         return bound
     # A multiplier that is left out, as those of the other cases are, bounds the mass all the same.
-    counts = adding[stress_height(beam, forces, limits.stress).argmax(axis=0)]
+    counts = (along & across)[stress_height(beam, forces, limits.stress).argmax(axis=0)]
     kept = found.multipliers._replace(
         lower=np.where(counts, found.multipliers.lower, 0.0),
-        deflections=np.where(adding[search.deflecting], found.multipliers.deflections, 0.0),
+        deflections=np.where(across[search.deflecting], found.multipliers.deflections, 0.0),
     )
     found = replace(found, multipliers=kept)
     price = search.price(H, forces, found)
@@ -407,14 +414,17 @@ def _lower_bound(search: _Search, H: Array, forces: Forces, found: Optimum) -> f
     return max(bound, mass(beam, H) + slack + float(np.minimum(gradient * down, gradient * up).sum()))
 
 
-def _adding(beam: Beam, cases: LoadCases) -> Array:
-    """The cases (k,) whose every internal force grows in size with every height; none for a strut, whose shear changes sign."""
-    if beam.support != "cantilever":
-        return np.zeros(cases.count, dtype=bool)
+def _adding(beam: Beam, cases: LoadCases) -> tuple[Mask, Mask]:
+    """Whether each case's (k,) forces along the link, and across it, grow in size with every height.
+
+    None does across a strut, whose shear changes sign.
+    """
     end, a = cases.end_force, cases.acceleration
     far = a[..., 0] + a[..., 1] * beam.length
-    rounding = 1e-12 * np.abs(end).max() * max(float(np.abs(a).max()), 1e-300)
-    against = (end * a[..., 0] <= rounding) & (end * far <= rounding)
-    turned = cases.end_moment * end[:, 1] >= 0.0
-    steady = (a[..., 0] * far >= -1e-12 * np.abs(a).max() ** 2).all(axis=1)
-    return np.asarray(against.all(axis=1) & turned & steady)
+    rounding = 1e-12 * float(np.abs(end).max()) * float(np.abs(a).max())
+    along, across = (
+        (end[:, i] * a[:, i, 0] <= rounding) & (end[:, i] * far[:, i] <= rounding) & (a[:, i, 0] * far[:, i] >= -rounding)
+        for i in (0, 1)
+    )
+    across &= (cases.end_moment * end[:, 1] >= 0.0) & (beam.support == "cantilever")
+    return along, across
