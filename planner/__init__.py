@@ -2,6 +2,7 @@
 
 from planner.checks import Row, Verdict, average_torque
 from planner.constraints import InfeasiblePathError
+from planner.links import LinkDesign, LinkTask, design_link
 from planner.path import JointLine, Path
 from planner.planning import Move, Profile, check, plan
 from planner.report import Report
@@ -12,6 +13,8 @@ from planner.trajectory import Trajectory, read_csv, sample, write_csv
 __all__ = [
     "InfeasiblePathError",
     "JointLine",
+    "LinkDesign",
+    "LinkTask",
     "Motion",
     "Move",
     "Path",
@@ -24,6 +27,7 @@ __all__ = [
     "Verdict",
     "average_torque",
     "check",
+    "design_link",
     "parse_hold",
     "parse_pitch",
     "parse_target",

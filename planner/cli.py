@@ -441,14 +441,14 @@ def link(
     """
     from planner import link_files, link_report
     from planner.files import check_writable
-    from planner.links import Task, default_moves, design_link
+    from planner.links import LinkTask, default_moves, design_link
     from planner.planning import plan_each_profile
     from planner.trajectory import read_csv
 
     files = {"recording": out, "picture": picture, "contour": contour, "csv": csv_file, "dxf": dxf, "boom": out_boom}
     check_writable(*files.values())
     boom = _load(boom_file, payload)
-    task = Task(
+    task = LinkTask(
         link=name,
         load=load,
         method=method,

@@ -60,7 +60,7 @@ class Method(StrEnum):
 
 
 @dataclass(frozen=True)
-class Task:
+class LinkTask:
     """What is asked of a link."""
 
     link: str = "inner"
@@ -119,7 +119,7 @@ class MotorChoice:
 class LinkDesign:
     """A designed link and what it changes."""
 
-    task: Task
+    task: LinkTask
     link: Link
     beam: Beam
     limits: Limits
@@ -176,7 +176,7 @@ class LinkDesign:
         return float(share.min()), float(share.max())
 
 
-def design_link(boom: Boom, task: Task, trajectories: Sequence[Trajectory]) -> LinkDesign:
+def design_link(boom: Boom, task: LinkTask, trajectories: Sequence[Trajectory]) -> LinkDesign:
     """The link that a task asks for, checked by finite elements, and back in the boom.
 
     Args:
@@ -262,7 +262,7 @@ def design_link(boom: Boom, task: Task, trajectories: Sequence[Trajectory]) -> L
     )
 
 
-def default_moves(boom: Boom, task: Task) -> list[Trajectory]:
+def default_moves(boom: Boom, task: LinkTask) -> list[Trajectory]:
     """Transport to phenotyping: with every profile in its least time, or the thesis's cubic of 5 s where its load is taken.
 
     Raises:
@@ -324,7 +324,7 @@ def _load_of(design: LinkDesign) -> ThesisLoad:
     return thesis_load(design.before, design.link, design.trajectories, payload_as=design.task.payload_as)
 
 
-def _by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: Task) -> ThesisDesign:
+def _by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: LinkTask) -> ThesisDesign:
     asked = {"minimum height": limits.min_height > 0.0, "maximum height": limits.max_height, "maximum taper": limits.max_taper}
     for name, given in asked.items():
         if given:
@@ -332,12 +332,12 @@ def _by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: Task) -> Thes
     return thesis_design(beam, load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=task.step)
 
 
-def _with_shear(task: Task) -> bool:
+def _with_shear(task: LinkTask) -> bool:
     return task.load == LoadFrom.MOVES if task.shear is None else task.shear
 
 
 def _equals(
-    beam: Beam, cases: LoadCases, limits: Limits, task: Task, old_load: ThesisLoad | None
+    beam: Beam, cases: LoadCases, limits: Limits, task: LinkTask, old_load: ThesisLoad | None
 ) -> tuple[float, float] | None:
     """Masses [kg] of the thesis's method and of the exact one under the thesis's own constraints; None without such a load.
 
@@ -418,7 +418,7 @@ def _motors(
 
 def _notes(
     boom: Boom,
-    task: Task,
+    task: LinkTask,
     link: Link,
     beam: Beam,
     cases: LoadCases,
@@ -453,7 +453,8 @@ def _notes(
     notes.append("lateral bending and torsion, fatigue, welds, pin holes and local buckling of a plate's edge are not checked")
     if bent > task.deflection * (1.0 + 1e-4):
         notes.append(
-            f"with its own mass and shear it deflects {1e3 * bent:.3f} mm, above its limit; the exact method with --shear holds it"
+            f"with its own mass and shear it deflects {1e3 * bent:.3f} mm, above its limit; "
+            "the exact method with --shear holds that"
         )
     required = task.safety_factor * pressed(cases)
     if required > 0.0 and tapered < required * (1.0 - 1e-5):

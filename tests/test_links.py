@@ -15,7 +15,7 @@ from boom_model.link_design.thesis_method import THESIS_LOAD
 from planner import cli, plan
 from planner.link_files import COLUMNS, write_boom, write_contour, write_outline, write_stations
 from planner.link_picture import write_link_picture
-from planner.links import Task, convergence_of_elements, convergence_of_slices, default_moves, design_link
+from planner.links import LinkTask, convergence_of_elements, convergence_of_slices, default_moves, design_link
 from planner.recording import write_link_recording
 from planner.validation import table_3_1_motion
 
@@ -27,13 +27,13 @@ OPTIMISED = Body(
 
 @pytest.fixture(scope="module")
 def old():
-    return design_link(BOOM, Task(load="thesis", method="thesis"), default_moves(BOOM, Task(load="thesis")))
+    return design_link(BOOM, LinkTask(load="thesis", method="thesis"), default_moves(BOOM, LinkTask(load="thesis")))
 
 
 @pytest.fixture(scope="module")
 def new():
     move = plan(BOOM, "transport", "phenotyping", duration=5.0).trajectory
-    return design_link(BOOM, Task(slices=200), [move])
+    return design_link(BOOM, LinkTask(slices=200), [move])
 
 
 @pytest.fixture
@@ -102,7 +102,7 @@ def test_largest_components_weigh_more_than_every_instant(new):
 
 @pytest.mark.parametrize("name", ["lower", "outer", "extension"])
 def test_every_link_can_be_designed(new, name):
-    found = design_link(BOOM, Task(link=name, slices=60, material="aluminium"), new.trajectories)
+    found = design_link(BOOM, LinkTask(link=name, slices=60, material="aluminium"), new.trajectories)
     assert found.own_deflection <= 0.01 * (1.0 + 1e-5)
     assert found.max_stress <= 138e6 * (1.0 + 1e-5)
     assert found.tapered_load >= 2.0 * found.pressed * (1.0 - 1e-4)

@@ -45,10 +45,8 @@ THESIS_LOAD = ThesisLoad(
 )
 """Thesis, section 3.5 with Appendix D's digits."""
 
-THESIS_WIDTH = 0.01
-THESIS_DEFLECTION = 0.01
 THESIS_STEP = 1e-4
-THESIS_SAFETY_FACTOR = 2.0
+"""delta-H [m]"""
 
 
 @dataclass(frozen=True, eq=False)
