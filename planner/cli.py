@@ -392,6 +392,7 @@ def check(
 @click.option("--step", type=float, default=1e-4, show_default=True, metavar="M", help="Thesis's method: its delta-H.")
 @click.option("--out", metavar="FILE.rrd", help="A recording of the design.")
 @click.option("--picture", metavar="FILE.png", help="Contour, stress, convergence, torque and mass.")
+@click.option("--convergence", is_flag=True, help="Studies by slices, delta-H and elements, in the JSON.")
 @click.option("--contour", metavar="FILE.txt", help="x, H/2, 0 for a CAD curve.")
 @click.option("--csv", "csv_file", metavar="FILE.csv", help="Heights, sections, forces and stress at the stations.")
 @click.option("--dxf", metavar="FILE.dxf", help="Outline of one plate in millimetres.")
@@ -421,6 +422,7 @@ def link(
     step: float,
     out: str | None,
     picture: str | None,
+    convergence: bool,
     contour: str | None,
     csv_file: str | None,
     dxf: str | None,
@@ -495,7 +497,12 @@ def link(
     if out_boom is not None:
         link_files.write_boom(out_boom, boom_file, design)
     if as_json:
-        _print_json(link_report.to_json(design, written))
+        answer = link_report.to_json(design, written)
+        if convergence:
+            from planner.link_convergence import study
+
+            answer["convergence"] = link_report.convergence_json(study(design))
+        _print_json(answer)
         return 0
     console = _console()
     console.print(link_report.title(design), highlight=False)

@@ -1,6 +1,7 @@
 """A link's design as a picture: contour, stress, convergence, original against designed."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,18 +9,17 @@ from boom_model.arrays import Array
 from boom_model.link_design import internal_forces, von_mises
 from planner.files import replacing
 from planner.link_report import title
-from planner.links import LinkDesign, convergence_of_elements, convergence_of_slices
+from planner.links import LinkDesign
 
-SLICES = (20, 50, 100, 200, 400, 600, 1000)
-"""Of the convergence study, as far as the design's own number (figure 3-14)."""
-ELEMENTS = (4, 8, 16, 32, 64, 128, 256)
-"""Of the convergence study (figures 3-18 and 3-20)."""
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+from planner.link_convergence import PLACES, study
 
 _BLUE, _ORANGE, _GREEN, _PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 
 
 def write_link_picture(path: str | Path, design: LinkDesign) -> None:
-    """Writes a PNG of six plots: both contours, stress and deflection along the link, both convergences, the joint's torque.
+    """Writes a PNG of eight plots: contours, stress along the link, convergences, the joint's torque, and mass.
 
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
@@ -27,9 +27,9 @@ def write_link_picture(path: str | Path, design: LinkDesign) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14.0, 13.0), dpi=120, layout="constrained")
+    figure = Figure(figsize=(14.0, 17.0), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    ((contour, stress), (slices, elements), (torque, bars)) = figure.subplots(3, 2)
+    ((contour, stress), (slices, steps), (elements, places), (torque, bars)) = figure.subplots(4, 2)
     figure.suptitle(title(design), fontsize=11)
     x = design.beam.stations
     for H, name, color in ((design.heights, "design", _BLUE), (design.stress_heights, "stress only", _ORANGE)):
@@ -41,16 +41,26 @@ def write_link_picture(path: str | Path, design: LinkDesign) -> None:
     stress.plot(x, 1e-6 * only.max(axis=0), color=_ORANGE, linewidth=1.0, label="stress only")
     stress.axhline(1e-6 * design.limits.stress, color="black", linestyle="--", linewidth=1.0, label="limit")
     stress.set(title="Largest von Mises stress", xlabel="x from the root [m]", ylabel="[MPa]", ylim=(0.0, None))
-    study = slices_study(design)
-    slices.plot(study[:, 0], study[:, 1], marker="o", color=_BLUE, label="plates")
+    found = study(design)
+    slices.plot(found.slices[:, 0], found.slices[:, 1], marker="o", color=_BLUE, label="plates")
     slices.set(title="Mass by number of slices", xlabel="slices", ylabel="[kg]")
-    found = convergence_of_elements(design, ELEMENTS)
-    for (name, curve), color in zip(found.items(), (_PURPLE, _BLUE, _GREEN, _ORANGE), strict=False):
+    steps.set(title="Mass by delta-H of the thesis's method", xlabel="delta-H [m]", ylabel="[kg]")
+    if found.steps is None or found.stepless is None:
+        _say(steps, "not run: single instants load the link")
+    else:
+        steps.semilogx(found.steps[:, 0], found.steps[:, 1], marker="o", color=_ORANGE, label="thesis's method")
+        steps.axhline(found.stepless, color=_BLUE, label="exact, at its constraints")
+    for (name, curve), color in zip(found.deflections.items(), (_PURPLE, _BLUE, _GREEN, _ORANGE), strict=False):
         elements.semilogx(curve[:, 0], 1e3 * curve[:, 1], marker=".", color=color, label=name)
     elements.axhline(1e3 * design.limits.deflection, color="black", linestyle="--", linewidth=1.0, label="limit")
-    elements.set(title="Deflection by finite elements", xlabel="elements along the link", ylabel="[mm]")
-    if not found:
-        elements.text(0.5, 0.5, "not modelled: the link telescopes", ha="center", transform=elements.transAxes)
+    elements.set(title="Deflection by finite elements", xlabel="elements", ylabel="[mm]")
+    places.set(title="Stress at places, beam elements of one height each", xlabel="elements", ylabel="[MPa]")
+    if found.stresses is None:
+        for axes in (elements, places):
+            _say(axes, "not modelled: the link telescopes")
+    else:
+        for place, curve in zip(PLACES, found.stresses.T[1:], strict=True):
+            places.semilogx(found.stresses[:, 0], 1e-6 * curve, marker=".", label=f"x = {place * design.link.length:.3g} m")
     t = np.concatenate([each.t for each in design.trajectories])
     for values, name, color in zip(design.torques, ("original link", "designed link"), (_ORANGE, _BLUE), strict=True):
         torque.plot(*_broken_between_moves(design, t, values), color=color, label=name)
@@ -62,7 +72,7 @@ def write_link_picture(path: str | Path, design: LinkDesign) -> None:
     for i, value in enumerate(masses):
         bars.text(i, value, f"{value:.2f} kg", ha="center", va="bottom")
     bars.set(title="Mass of the whole link", ylabel="[kg]", ylim=(0.0, 1.15 * max(masses)))
-    for axes in (contour, stress, slices, elements, torque, bars):
+    for axes in (contour, stress, slices, steps, elements, places, torque, bars):
         axes.grid(alpha=0.25)
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=8)
@@ -70,9 +80,8 @@ def write_link_picture(path: str | Path, design: LinkDesign) -> None:
         figure.savefig(temporary, format="png")
 
 
-def slices_study(design: LinkDesign) -> Array:
-    """(slices, mass [kg]) up to the design's own number of slices."""
-    return convergence_of_slices(design, [n for n in SLICES if n < design.beam.slices] + [design.beam.slices])
+def _say(axes: "Axes", text: str) -> None:
+    axes.text(0.5, 0.5, text, ha="center", transform=axes.transAxes)
 
 
 def _broken_between_moves(design: LinkDesign, t: Array, values: Array) -> tuple[Array, Array]:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from boom_model import JOINTS
+from planner.link_convergence import PLACES, Convergence
 from planner.links import LinkDesign
 
 
@@ -73,6 +74,17 @@ def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:
         ],
         "notes": list(design.notes),
         "files": files,
+    }
+
+
+def convergence_json(found: Convergence) -> dict[str, Any]:
+    """The convergence studies, in SI: rows of what is varied and what comes out."""
+    return {
+        "slices_mass_kg": found.slices.tolist(),
+        "step_mass_kg": None if found.steps is None else found.steps.tolist(),
+        "stepless_kg": found.stepless,
+        "elements_deflection_m": {name: curve.tolist() for name, curve in found.deflections.items()},
+        "elements_stress_Pa": None if found.stresses is None else {"places": PLACES, "rows": found.stresses.tolist()},
     }
 
 

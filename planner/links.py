@@ -32,7 +32,7 @@ from boom_model.link_design import (
     with_body,
 )
 from boom_model.link_design.exact import buckling_load, pressed
-from boom_model.link_design.finite_elements import Solution, Theory, solve_beam, solve_plate
+from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
 from planner.checks import Verdict
 from planner.link_loads import largest_components, link_cases, thesis_load
@@ -124,6 +124,8 @@ class LinkDesign:
     beam: Beam
     limits: Limits
     cases: LoadCases
+    thesis_load: ThesisLoad | None
+    """The load as the thesis's method takes it; None where only single instants load the link"""
     equal_constraints: tuple[float, float] | None
     """Masses of the plates by the thesis's method and the exact one under the same constraints, the thesis's [kg]"""
     instants: Array | None
@@ -216,10 +218,10 @@ def design_link(boom: Boom, task: LinkTask, trajectories: Sequence[Trajectory]) 
             cases, instants = largest_components(cases), None
     exact, old = None, None
     if method is Method.THESIS and old_load is not None:
-        old = _by_thesis(beam, old_load, limits, task)
+        old = by_thesis(beam, old_load, limits, task)
         heights, stress_heights = old.heights, old.stress_heights
     else:
-        exact = least_mass(beam, cases, limits, own_mass=task.own_mass, shear=_with_shear(task))
+        exact = least_mass(beam, cases, limits, own_mass=task.own_mass, shear=with_shear(task))
         heights, stress_heights = exact.heights, exact.stress_heights
     forces = internal_forces(beam, heights, cases)
     bent = deflection(beam, heights, forces, shear=True)
@@ -234,6 +236,7 @@ def design_link(boom: Boom, task: LinkTask, trajectories: Sequence[Trajectory]) 
         beam=beam,
         limits=limits,
         cases=cases,
+        thesis_load=old_load,
         equal_constraints=_equals(beam, cases, limits, task, old_load),
         instants=instants,
         heights=heights,
@@ -282,49 +285,12 @@ def thesis_buckling(link: Link, beam: Beam, heights: Array) -> float:
     return euler_load(beam.material.elastic_modulus, wide * narrow**3 / 12.0, beam.length)
 
 
-def convergence_of_slices(design: LinkDesign, slices: Sequence[int]) -> Array:
-    """(slices, mass [kg]) of the same design with other numbers of slices, (m, 2) (figure 3-14)."""
-    found = []
-    for n in slices:
-        beam = replace(design.beam, slices=n)
-        if design.thesis is not None:
-            found.append(_by_thesis(beam, _load_of(design), design.limits, design.task).mass)
-        else:
-            found.append(
-                least_mass(
-                    beam, design.cases, design.limits, own_mass=design.task.own_mass, shear=_with_shear(design.task)
-                ).mass
-            )
-    return np.stack([np.asarray(slices, dtype=float), found], axis=-1)
+def by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: LinkTask) -> ThesisDesign:
+    """The thesis's design for a task.
 
-
-def convergence_of_elements(design: LinkDesign, elements: Sequence[int]) -> dict[str, Array]:
-    """(elements, deflection [m]) of each model, (m, 2) (figures 3-18 and 3-20); the plate has two elements over its height."""
-    case = design.cases.at([design.worst])
-    found: dict[str, Array] = {}
-    if case.clamp[0] > 0.0:
-        return found
-    H, beam = design.heights, design.beam
-
-    def deflection_of(name: str, n: int) -> float:
-        if name == "plane stress":
-            return solve_plate(beam, H, case, max(n // 2, 1), 2).deflection
-        theory: Theory = "timoshenko" if name.startswith("Timoshenko") else "euler-bernoulli"
-        return solve_beam(beam, H, case, n, theory, prismatic=name.endswith("element")).deflection
-
-    names = ["Euler-Bernoulli beam, one height an element", "Euler-Bernoulli beam", "Timoshenko beam"]
-    for name in names + (["plane stress"] if beam.support == "cantilever" else []):
-        found[name] = np.array([(n, deflection_of(name, n)) for n in elements])
-    return found
-
-
-def _load_of(design: LinkDesign) -> ThesisLoad:
-    if design.task.load == LoadFrom.THESIS:
-        return THESIS_LOAD
-    return thesis_load(design.before, design.link, design.trajectories, payload_as=design.task.payload_as)
-
-
-def _by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: LinkTask) -> ThesisDesign:
+    Raises:
+        InputError: a limit is given that its method does not know.
+    """
     asked = {"minimum height": limits.min_height > 0.0, "maximum height": limits.max_height, "maximum taper": limits.max_taper}
     for name, given in asked.items():
         if given:
@@ -332,7 +298,8 @@ def _by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: LinkTask) -> 
     return thesis_design(beam, load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=task.step)
 
 
-def _with_shear(task: LinkTask) -> bool:
+def with_shear(task: LinkTask) -> bool:
+    """Whether shear counts in the deflection of a task's exact design."""
     return task.load == LoadFrom.MOVES if task.shear is None else task.shear
 
 

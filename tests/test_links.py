@@ -13,9 +13,10 @@ from boom_model import Body, Boom, inverse_dynamics
 from boom_model.link_design import Beam, Material, link_body, load_link, thesis_design
 from boom_model.link_design.thesis_method import THESIS_LOAD
 from planner import cli, plan
+from planner.link_convergence import study
 from planner.link_files import COLUMNS, write_boom, write_contour, write_outline, write_stations
 from planner.link_picture import write_link_picture
-from planner.links import LinkTask, convergence_of_elements, convergence_of_slices, default_moves, design_link
+from planner.links import LinkTask, default_moves, design_link
 from planner.recording import write_link_recording
 from planner.validation import table_3_1_motion
 
@@ -115,13 +116,20 @@ def test_assumed_material_is_said_to_be(new):
 
 
 def test_convergence_studies(old, new):
-    by_thesis, by_optimum = (convergence_of_slices(design, (25, 50, 100, 200)) for design in (old, new))
-    for study in (by_thesis, by_optimum):
-        steps = np.abs(np.diff(study[:, 1]))
-        assert steps[0] > 1.5 * steps[1] > 2.25 * steps[2]
-    found = convergence_of_elements(new, (16, 64, 256))
-    assert len(found) == 4
-    assert found["Timoshenko beam"][-1, 1] == pytest.approx(0.01, rel=1e-3)
+    by_thesis, by_optimum = study(old), study(new)
+    for found in (by_thesis, by_optimum):
+        errors = np.abs(found.slices[:-1, 1] - found.slices[-1, 1])
+        assert (np.diff(errors) < 0.0).all()
+        assert errors[-1] < 2e-3 * found.slices[-1, 1]
+    assert by_optimum.steps is None
+    assert (by_thesis.steps[:, 1] > by_thesis.stepless).all()
+    excess = by_thesis.steps[[0, 3, 6], 1] / by_thesis.stepless - 1.0
+    assert excess[0] - excess[1] > 20.0 * (excess[1] - excess[2]) > 0.0
+    assert len(by_optimum.deflections) == 4
+    assert by_optimum.deflections["Timoshenko beam"][-1, 1] == pytest.approx(0.01, rel=1e-3)
+    last = by_thesis.stresses[:, 1:]
+    np.testing.assert_allclose(last[-1, 1:4], np.interp([0.3, 0.5, 0.7], old.beam.stations, old.stress), rtol=0.02)
+    assert (np.abs(np.diff(last, axis=0)[-1]) < np.abs(np.diff(last, axis=0)[0])).all()
 
 
 def test_files_hold_the_design(old, tmp_path):
