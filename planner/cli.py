@@ -355,6 +355,7 @@ def check(
 
 @cli.command()
 @click.option("--link", "name", default="inner", show_default=True, metavar="inner|lower|outer|extension", help="Which link.")
+@click.option("--links", metavar="FILE.toml", help="Plates and fittings of your own links; else the shipped ones.")
 @click.option(
     "--load", type=click.Choice(["moves", "thesis"]), default="moves", show_default=True,
     help="Every instant of the moves, or the thesis's load case.",
@@ -401,6 +402,7 @@ def check(
 @json_option
 def link(
     name: str,
+    links: str | None,
     load: str,
     method: str,
     moves: tuple[tuple[str, str], ...],
@@ -468,6 +470,7 @@ def link(
         buckling=not no_buckling,
         largest_components=largest_components,
         payload_as=payload_as,
+        links=links,
     )
     trajectories = [read_csv(motion) for motion in motions]
     for start, goal in moves:

@@ -88,6 +88,8 @@ class LinkTask:
     largest_components: bool = False
     """Take each component's largest at once, and not every instant"""
     payload_as: PayloadAs = "mass"
+    links: str | None = None
+    """The TOML file of plates and fittings; None is the shipped one"""
 
 
 @dataclass(frozen=True)
@@ -191,7 +193,7 @@ def design_link(boom: Boom, task: LinkTask, trajectories: Sequence[Trajectory]) 
     load, method = _one_of("load", task.load, LoadFrom), _one_of("method", task.method, Method)
     if not (np.isfinite(task.safety_factor) and task.safety_factor > 0.0):
         raise InputError(f"safety factor is {task.safety_factor:g}; it must be finite and above 0")
-    link = load_link(boom, task.link)
+    link = load_link(boom, task.link, task.links)
     if task.thickness is not None:
         link = replace(link, width=task.thickness * link.plates)
     material = Material.load(task.material)

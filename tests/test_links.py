@@ -11,6 +11,7 @@ import pytest
 
 from boom_model import Body, Boom, inverse_dynamics
 from boom_model.link_design import Beam, Material, link_body, load_link, thesis_design
+from boom_model.link_design.link import LINKS_FILE
 from boom_model.link_design.thesis_method import THESIS_LOAD
 from planner import cli, plan
 from planner.link_convergence import study
@@ -232,6 +233,18 @@ def test_loads_that_are_not_finite_are_refused(boom, tmp_path):
     code, _, err = boom("link", "--motion", "wild.csv", "--slices", "50")
     assert code == 2
     assert "finite" in err
+
+
+def test_links_of_your_own(boom, tmp_path):
+    text = LINKS_FILE.read_text().replace("designed_from = 0.15", "cross_plates = 4\ndesigned_from = 0.15")
+    (tmp_path / "mine.toml").write_text(text)
+    thesis = ("link", "--load", "thesis", "--method", "thesis", "--json")
+    masses = [json.loads(boom(*thesis, *more)[1])["body"]["mass_kg"] for more in ((), ("--links", "mine.toml"))]
+    assert 0.3 < masses[1] - masses[0] < 1.0
+    (tmp_path / "mine.toml").write_text(text.replace("plates = 2", "plates = 0", 1))
+    code, _, err = boom(*thesis, "--links", "mine.toml")
+    assert code == 2
+    assert "mine.toml: key links.inner.plates" in err
 
 
 def test_thesis_method_on_the_loads_of_moves(new):
