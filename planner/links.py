@@ -34,9 +34,9 @@ from boom_model.link_design import (
 from boom_model.link_design.exact import buckling_load, pressed
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
-from planner.checks import Verdict
 from planner.link_loads import largest_components, link_cases, thesis_load
 from planner.planning import check, plan, plan_each_profile
+from planner.rows import Verdict
 from planner.trajectory import Trajectory
 
 E = TypeVar("E", bound=StrEnum)
@@ -374,8 +374,8 @@ def _motors(
             for row in check(replace(boom, drives=drives), t, payload_as=payload_as).rows
             if row.joint == JOINTS[joint] and row.check.startswith("motor")
         ]
-        order = [Verdict.PASS, Verdict.WARN, Verdict.NOT_CHECKABLE, Verdict.FAIL]
-        margins = [row.margin for row in rows if row.margin is not None and "torque" in row.check]
+        order = [Verdict.INFO, Verdict.PASS, Verdict.WARN, Verdict.NOT_CHECKABLE, Verdict.FAIL]
+        margins = [r.margin for r in rows if r.margin is not None and "torque" in r.check and r.verdict is not Verdict.INFO]
         return max((row.verdict for row in rows), key=order.index), min(margins, default=None)
 
     choices = []

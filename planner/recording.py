@@ -190,7 +190,6 @@ def write_link_recording(path: str | Path, design: LinkDesign) -> None:
         InputError: the file cannot be written; an old one is left as it was.
     """
     boom, trajectory, link = design.after, design.trajectories[0], design.link
-    poses = body_transforms(boom, trajectory.q)
     before, after = (torque[: trajectory.t.size] for torque in design.torques)
     joint = JOINTS[design.joint]
     torque = _Bundle(
