@@ -385,7 +385,7 @@ ROW_HEADER = (
     "rms mm",
     "rest mm",
     "shakes mm",
-    "overshoot",
+    "over",
     "settles s",
     "torque",
     "outcome",
@@ -396,7 +396,8 @@ LOOP_HEADER = ("controller", "joint", "gain margin dB", "less gain dB", "phase m
 
 ROW_LEGEND = (
     "tip: its largest error, RMS until the command ends, and what stays at rest (sag); shakes: residual vibration after the "
-    "command's end; settles: after it; torque: largest share of what the motor has at its speed, where that is known"
+    "command's end; over: overshoot of a joint; settles: after that end; torque: largest share of what the motor "
+    "has at its speed, where that is known"
 )
 
 
