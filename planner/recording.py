@@ -14,10 +14,13 @@
     .../limits                the limits beside it; those that do not change with the motion at the move's two ends only
     /report                   the report as Markdown
 
+A designed link's and a reach map's recordings say at their functions what they hold.
+
 The timeline is "t". The linkage comes solved: each body's frame is a child of the mount, because a frame has one parent and
 a closed loop cannot be shown. The solids' lengths are the model's, their thickness is for the eye only.
 """
 
+import tempfile
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -41,6 +44,10 @@ from planner.control.picture import PALETTE, error_figure, loop_figure, png
 from planner.control.study import Study
 from planner.drive_pictures import drive_picture
 from planner.files import replacing
+from planner.link_picture import write_link_picture
+from planner.link_report import title as link_title
+from planner.link_report import to_markdown as link_markdown
+from planner.links import LinkDesign
 from planner.planning import Move
 from planner.reach_picture import margin_colors, margin_range, reach_title, reference_pose
 from planner.trajectory import Trajectory
@@ -168,6 +175,75 @@ def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> 
 
     with replacing(path) as temporary:
         Path(temporary).write_bytes(_encoded(title.partition("\n")[0], log))
+
+
+def write_link_recording(path: str | Path, design: LinkDesign) -> None:
+    """Writes a designed link on the boom along its first move, the joint's torque before and after, the picture and the report.
+
+    /world/boom/<link>/plates    the designed plates, in their own place and thickness, over the linkage's plain solids
+    /plots/torque/<link>         the joint's torque with the original link and the designed one
+    /picture                     contour, stress, convergence, torque and mass: see `link_picture`
+    /report                      the report as Markdown
+
+    Args:
+        path: the .rrd file.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    boom, trajectory, link = design.after, design.trajectories[0], design.link
+    poses = body_transforms(boom, trajectory.q)
+    before, after = (torque[: trajectory.t.size] for torque in design.torques)
+    joint = JOINTS[design.joint]
+    torque = _Bundle(
+        f"plots/torque/{link.name}",
+        f"{joint} torque [Nm]",
+        ["original link [Nm]", "designed link [Nm]"],
+        [LIMIT_COLOR, COLORS[link.name]],
+        np.stack([before, after], axis=-1),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "link.png"
+        write_link_picture(picture, design)
+        image = picture.read_bytes()
+
+    def log(recording: rr.RecordingStream) -> None:
+        views = rrb.Tabs(
+            rrb.Spatial2DView(origin="/picture", name="Design"),
+            rrb.TimeSeriesView(origin=f"/{torque.entity}", name=torque.title),
+            rrb.TextDocumentView(origin="/report", name="Report"),
+            active_tab=0,
+        )
+        scene = rrb.Spatial3DView(origin="/world", name="Boom [m]", eye_controls=_eye(boom, trajectory.q))
+        recording.send_blueprint(_shown_beside(scene, views, [2, 3]))
+        recording.log("report", rr.TextDocument(link_markdown(design), media_type="text/markdown"), static=True)
+        recording.log("picture", rr.EncodedImage(contents=image, media_type="image/png"), static=True)
+        _log_solids(recording, boom, without=link.name)
+        _log_motion(recording, boom, trajectory.t, trajectory.q, None)
+        _log_plates(recording, design)
+        _log_bundle(recording, trajectory.t, torque)
+
+    with replacing(path) as temporary:
+        Path(temporary).write_bytes(_encoded(link_title(design), log))
+
+
+def _log_plates(recording: rr.RecordingStream, design: LinkDesign) -> None:
+    """The plates as boxes, a hundred along the link: a mesh would need normals, and a box shows its edges."""
+    link, beam = design.link, design.beam
+    edges = np.linspace(0.0, link.length, 101)
+    middle = (edges[1:] + edges[:-1]) / 2.0
+    half = np.interp(middle, beam.stations, design.heights) / 2.0
+    thickness = beam.width / beam.plates
+    across = np.linspace(-0.5, 0.5, beam.plates) * link.spacing if beam.plates > 1 else np.zeros(1)
+    centers = np.array([(x, 0.0, z) for z in across for x in middle])
+    if link.name == "extension":  # from its root to the wrist, where its frame stands
+        centers = (centers - [link.length, 0.0, 0.0]) * [-1.0, 1.0, 1.0]
+    sizes = np.tile(np.stack([np.diff(edges) / 2.0, half, np.full_like(half, thickness / 2.0)], axis=-1), (beam.plates, 1))
+    R = R_LINK_BODY[link.name]
+    low, high = (centers - sizes) @ R, (centers + sizes) @ R
+    recording.log(
+        f"world/boom/{link.name}/plates", _boxes(low, high, COLORS[link.name]), rr.CoordinateFrame(link.name), static=True
+    )
 
 
 def write_control_recording(path: str | Path, study: Study, *, step: float = 0.005) -> None:
@@ -341,7 +417,7 @@ def _log_motion(
     recording.log("world/planned/tip_path" if ghost else "world/tip_path", path, rr.CoordinateFrame("mount"), static=True)
 
 
-def _log_solids(recording: rr.RecordingStream, boom: Boom, ghost: bool = False) -> None:
+def _log_solids(recording: rr.RecordingStream, boom: Boom, ghost: bool = False, *, without: str | None = None) -> None:
     """The solids of the boom, or the edges alone of a second one's: "planned" stands before the names of its frames."""
     place, prefix = ("planned", "planned ") if ghost else ("boom", "")
     fill: Literal["solid", "majorwireframe"] = "majorwireframe" if ghost else "solid"
@@ -352,6 +428,8 @@ def _log_solids(recording: rr.RecordingStream, boom: Boom, ghost: bool = False) 
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     log("world/mount", _boxes(np.array([[-0.2, -0.2, -0.02]]), np.array([[0.2, 0.2, 0.0]]), PIN_COLOR), "mount")
     for name, bars in _bars(boom).items():
+        if name == without:
+            continue
         R = R_LINK_BODY[name]
         low, high = (np.array([corner(bar) for bar in bars]) @ R for corner in (_Bar.low, _Bar.high))
         log(f"world/{place}/{name}", _boxes(low, high, COLORS[name], fill), f"{prefix}{name}")
