@@ -40,6 +40,8 @@ from boom_model.frames import R_LINK_BODY, frame_transforms
 from boom_model.keep_out import Box, KeepOut
 from boom_model.reach import ReachMap
 from planner.comparison import Comparison
+from planner.control.picture import PALETTE, error_figure, loop_figure, png
+from planner.control.study import Study
 from planner.drive_pictures import drive_picture
 from planner.files import replacing
 from planner.link_picture import write_link_picture
@@ -241,6 +243,103 @@ def _log_plates(recording: rr.RecordingStream, design: LinkDesign) -> None:
     recording.log(
         f"world/boom/{link.name}/plates", _boxes(low, high, COLORS[link.name]), rr.CoordinateFrame(link.name), static=True
     )
+
+
+def write_control_recording(path: str | Path, study: Study, *, step: float = 0.005) -> None:
+    """Writes a study's recording: the boom as the first case moves it, every case's curves, pictures and report.
+
+    /world                                    the boom following the first case
+    /tip_error/<profile>/<shaper>             of every controller [mm]
+    /cases/<profile>/<controller>/<shaper>/   q/<joint> commanded, link and motor; error/<joint>; tau/<joint> asked and limit
+    /pictures/loops, /pictures/errors         Bode, poles and the tip's error as images
+    /report                                   the report as Markdown
+
+    Args:
+        path: the .rrd file.
+        step: sampling step of the curves [s]; a controller's own period would make a file of some 100 MB.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    run, boom = study.run, study.boom
+    every = slice(None, None, max(1, round(step / float(run.t[1]))))
+    t = run.t[every]
+    names = [f"{row.profile}/{row.controller}/{row.shaper}" for row in study.rows]
+    errors = _tip_errors(study, every)
+    tabs = {name: _case_bundles(study, b, every, name) for b, name in enumerate(names)}
+    pictures = {"errors": png(error_figure(study))} | ({"loops": png(loop_figure(study))} if study.designs else {})
+
+    def log(recording: rr.RecordingStream) -> None:
+        grids = [
+            rrb.Grid(*(rrb.TimeSeriesView(origin=f"/{b.entity}", name=b.title) for b in tab), grid_columns=3, name=name)
+            for name, tab in tabs.items()
+        ]
+        images = [rrb.Spatial2DView(origin=f"/pictures/{name}", name=name) for name in pictures]
+        report = rrb.TextDocumentView(origin="/report", name="Report")
+        views = [rrb.TimeSeriesView(origin=f"/{bundle.entity}", name=bundle.title) for bundle in errors]
+        tip = rrb.Vertical(*views, name="Tip error")
+        view = rrb.Spatial3DView(origin="/world", name=f"Boom [m], {names[0]}", eye_controls=_eye(boom, run.q[every, 0]))
+        recording.send_blueprint(_shown_beside(view, rrb.Tabs(tip, *images, report, *grids, active_tab=0), [1, 2]))
+        recording.log("report", rr.TextDocument(study.to_markdown(), media_type="text/markdown"), static=True)
+        _log_solids(recording, boom)
+        _log_motion(recording, boom, t, run.q[every, 0], study.setup.vehicle)
+        for bundle in (*errors, *(bundle for tab in tabs.values() for bundle in tab)):
+            _log_bundle(recording, t, bundle)
+        for name, content in pictures.items():
+            recording.log(f"pictures/{name}", rr.EncodedImage(contents=content, media_type="image/png"), static=True)
+
+    with replacing(path) as temporary:
+        Path(temporary).write_bytes(_encoded(f"{boom.name}: closed loop", log))
+
+
+def _tip_errors(study: Study, every: slice) -> list["_Bundle"]:
+    """The tip's error of all controllers, by profile and shaper."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for b, row in enumerate(study.rows):
+        groups.setdefault((row.profile, row.shaper), []).append(b)
+    return [
+        _Bundle(
+            f"tip_error/{profile}/{shaper}",
+            f"{profile}, shaper {shaper}: tip error [mm]",
+            [study.rows[b].controller for b in cases],
+            PALETTE[: len(cases)],
+            1e3 * study.tip_error[every][:, cases],
+        )
+        for (profile, shaper), cases in groups.items()
+    ]
+
+
+def _case_bundles(study: Study, b: int, every: slice, name: str) -> list["_Bundle"]:
+    """Of case b: commanded and actual position, error, and torque with its limit, of each joint."""
+    run = study.run
+    ours, theirs = COLORS["extension"], COLORS["upper"]
+    bundles = []
+    for i, joint in enumerate(JOINTS):
+        unit, torque = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
+        q = [_for_people(i, x[every, b, i]) for x in (run.command, run.q, run.motor)]
+        limit = run.limit[every, b, i]
+        tau, names = [run.torque[every, b, i]], ["asked of the drive"]
+        if np.isfinite(limit).all():
+            tau += [limit, -limit]
+            names += ["motor's limit (estimated)"] * 2
+        bundles += [
+            _Bundle(
+                f"cases/{name}/q/{joint}",
+                f"{joint} position [{unit}]",
+                ["commanded", "link", "motor"],
+                [LIMIT_COLOR, ours, theirs],
+                np.stack(q, axis=-1),
+            ),
+            _Bundle(f"cases/{name}/error/{joint}", f"{joint} error [{unit}]", ["link"], [ours], (q[1] - q[0])[:, None]),
+            _Bundle(
+                f"cases/{name}/tau/{joint}",
+                f"{joint} [{torque}]",
+                names,
+                [ours, LIMIT_COLOR, LIMIT_COLOR][: len(tau)],
+                np.stack(tau, axis=-1),
+            ),
+        ]
+    return bundles
 
 
 def _log_reach(recording: rr.RecordingStream, reach_map: ReachMap, cells: Array, half: float) -> None:
