@@ -11,6 +11,7 @@ from planner.planning import Move, plan
 from planner.report import Report
 from planner.targets import Target
 from planner.timing import Profile
+from planner.tracking import Track
 
 
 @dataclass(frozen=True)
@@ -36,18 +37,19 @@ class ProfileRow:
 HEADER = ("profile", "duration", "velocity", "acceleration", "jerk", "gearbox", "motor torque", "motor speed", "worst stop")
 
 
-def profile_table(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[ProfileRow, ...]:
+def profile_table(boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any) -> tuple[ProfileRow, ...]:
     """Every profile's row for one move, the time-optimal one also with its jerk bounded.
 
     Args:
+        track: iterates over the profiles, and may show how far it is.
         options: of `plan`, other than the profile's.
 
     Raises:
         InputError, InfeasibleError: as `plan`.
     """
-    rows = [_row(profile, plan(boom, start, goal, profile=profile, **options)) for profile in Profile]
-    smooth = plan(boom, start, goal, profile=Profile.TIME_OPTIMAL, jerk_bound=True, **options)
-    return (*rows, _row("time-optimal, jerk bound", smooth))
+    timings: list[tuple[str, dict[str, Any]]] = [(profile, {"profile": profile}) for profile in Profile]
+    timings.append(("time-optimal, jerk bound", {"profile": Profile.TIME_OPTIMAL, "jerk_bound": True}))
+    return tuple(_row(name, plan(boom, start, goal, **timing, **options)) for name, timing in track(timings))
 
 
 def cells(row: ProfileRow) -> tuple[str, ...]:
