@@ -188,5 +188,6 @@ def to_markdown(design: LinkDesign) -> str:
 
 
 def title(design: LinkDesign) -> str:
+    """What was designed, how, and for which loads."""
     task = design.task
     return f"{design.before.name}: {design.link.name} link, {task.method} method, loads of {task.load}, {task.material}"
