@@ -77,7 +77,7 @@ def drive_figure(boom: Boom, trajectory: Trajectory, tau: Array, report: Report,
     figure = _figure(18.0, high)
     ratios = [1.0] * len(driven) + [0.5]
     margin = {"left": 0.04, "right": 0.985, "bottom": 0.85 / high, "top": 1.0 - 0.75 / high}
-    grid = figure.add_gridspec(len(ratios), 4, height_ratios=ratios, width_ratios=_WIDTHS, wspace=0.2, hspace=0.36, **margin)
+    grid = figure.add_gridspec(len(ratios), 4, height_ratios=ratios, width_ratios=_WIDTHS, wspace=0.2, hspace=0.4, **margin)
     shown = list(parts) or [slice(0, len(trajectory.t))]
     for k, (i, drive) in enumerate(driven):
         panels = [figure.add_subplot(grid[k, column]) for column in (0, 1, 3)]
@@ -95,14 +95,14 @@ def drive_pages(
     shown, driven = list(parts) or [slice(0, len(trajectory.t))], _driven(boom)
     pages = {}
     for i, drive in driven:
-        figure = pages[f"Drive of {JOINTS[i]}"] = _figure(15.5, 8.0)
-        grid = figure.add_gridspec(1, 4, width_ratios=_WIDTHS, wspace=0.22, left=0.05, right=0.985, bottom=0.15, top=0.95)
+        figure = pages[f"Drive of {JOINTS[i]}"] = _figure(15.5, 9.6)
+        grid = figure.add_gridspec(1, 4, width_ratios=_WIDTHS, wspace=0.22, left=0.05, right=0.985, bottom=0.18, top=0.95)
         panels = [figure.add_subplot(grid[0, column]) for column in (0, 1, 3)]
         _drive(panels, i, drive, trajectory, tau, report, shown)
     if driven:
-        figure = pages["Tip"] = _figure(12.0, 5.0)
+        figure = pages["Tip"] = _figure(12.0, 7.4)
         axes = figure.add_subplot()
-        figure.subplots_adjust(left=0.06, right=0.985, bottom=0.2, top=0.93)
+        figure.subplots_adjust(left=0.06, right=0.985, bottom=0.2, top=0.95)
         _tip(axes, boom, trajectory, tau, shown)
     return pages
 
@@ -164,7 +164,7 @@ def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: A
     axes.set_xlim(0.0, fastest * _RPM)
     axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.25)
-    _legend_below(axes, 2)
+    _legend_below(axes, 1)
 
 
 def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts: Sequence[slice], rows: Sequence[Row]) -> None:
@@ -183,7 +183,7 @@ def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts
         axes.axhline(average, color=_CURVE, linestyle="--", label=f"average of the cycle {average:.0f} Nm")
     axes.set(title=f"{joint}: {gear.name}", ylabel="gearbox torque, size [Nm]")
     axes.set_ylim(bottom=0.0)
-    _legend_below(axes, 3)
+    _legend_below(axes, 2)
 
 
 def _tip(axes: "Axes", boom: Boom, trajectory: Trajectory, tau: Array, parts: Sequence[slice]) -> None:

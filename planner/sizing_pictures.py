@@ -9,7 +9,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MARKS = "osD^vPX*"
-_FINE, _FAILS = "#0072b2", "#d55e00"  # Okabe and Ito's blue and vermilion, which the colour-blind can tell apart
+_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Okabe and Ito's, which the colour-blind can tell apart: one a drive."""
+
 _SHOWN = (-0.5, 3.0)
 """Rooms beyond are drawn at the edge."""
 
@@ -24,38 +26,34 @@ def sizing_pictures(choices: Sequence[Choice]) -> dict[str, "Figure"]:
 
     joints = list(dict.fromkeys(choice.joint for choice in choices if choice.judged))
     variants = list(dict.fromkeys(choice.variant for choice in choices))
+    names = list(dict.fromkeys(judged.name for choice in choices for judged in choice.judged))
     if not joints:
         return {}
     columns = min(len(joints), 3)
-    figure = Figure(figsize=(12.0, 4.5 if len(joints) <= 3 else 7.5), dpi=110, layout="constrained")
+    figure = Figure(figsize=(12.0, 6.5 if len(joints) <= 3 else 7.8), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
     panels = figure.subplots(-(-len(joints) // columns), columns, squeeze=False).ravel()
     for joint, axes in zip(joints, panels, strict=False):
         axes.axhline(0.0, color="black", linewidth=0.8)
         for choice in choices:
-            mark, named = _MARKS[variants.index(choice.variant) % len(_MARKS)], set()
+            mark = _MARKS[variants.index(choice.variant) % len(_MARKS)]
             for judged in choice.judged if choice.joint == joint else ():
                 tightest = judged.tightest()
                 if judged.mass is None or tightest is None:
                     continue
-                spare = min(max(room(tightest), _SHOWN[0]), _SHOWN[1])
-                axes.plot(judged.mass, 100.0 * spare, mark, color=_FAILS if judged.fails else _FINE, markersize=5, alpha=0.7)
-                if not judged.fails and judged.name not in named and choice is _first(choices, joint):
-                    named.add(judged.name)
-                    place = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": 6}
-                    axes.annotate(judged.name, (judged.mass, 100.0 * spare), **place)
+                spare = 100.0 * min(max(room(tightest), _SHOWN[0]), _SHOWN[1])
+                color = _COLORS[names.index(judged.name) % len(_COLORS)]
+                axes.plot(judged.mass, spare, mark, color=color, fillstyle="none" if judged.fails else "full", markersize=6)
         axes.set(title=joint, xlabel="mass of the drive [kg]", ylabel="least room beyond what is required [%]")
-        axes.margins(x=0.25)
+        axes.margins(x=0.15)
         axes.grid(alpha=0.3, linewidth=0.5)
     for axes in panels[len(joints) :]:
         axes.axis("off")
-    for variant, mark in zip(variants, _MARKS, strict=False):
-        panels[0].plot([], [], mark, color="grey", label=variant)
-    for color, label in ((_FINE, "no FAIL"), (_FAILS, "FAIL")):
-        panels[0].plot([], [], "s", color=color, label=label)
-    figure.legend(loc="outside lower center", ncols=8, frameon=False, fontsize=8)
+    key = panels[0]
+    for k, name in enumerate(names):
+        key.plot([], [], "s", color=_COLORS[k % len(_COLORS)], label=name)
+    for k, variant in enumerate(variants):
+        key.plot([], [], _MARKS[k % len(_MARKS)], color="grey", label=f"boom: {variant}")
+    key.plot([], [], "o", color="grey", fillstyle="none", label="hollow: FAIL")
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return {"Drives by mass and room": figure}
-
-
-def _first(choices: Sequence[Choice], joint: str) -> Choice:
-    return next(choice for choice in choices if choice.joint == joint)

@@ -81,7 +81,9 @@ def mission(
     if document is not None:
         text = next(iter(reports.values())).to_markdown() if alone else side_by_side_markdown(reports, joints)
         pages = {name: drive_pages(*shown) for name, shown in drawn.items()}
-        titled = {f"{name}: {title}": page for name, page_of in pages.items() for title, page in page_of.items()}
+        titled = {
+            title if alone else f"{name}: {title}": page for name, page_of in pages.items() for title, page in page_of.items()
+        }
         write_document(document, text, titled)
         written["report"] = document
     if picture is not None:
