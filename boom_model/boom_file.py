@@ -26,7 +26,7 @@ BasisName = Literal["printed", "estimated", "assumed"]
 Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 
 
-def _inertia(value: Any) -> Array:
+def inertia_tensor(value: Any) -> Array:
     """The tensor of [Ixx, Iyy, Izz] or of a 3 x 3 matrix, as a body can have it."""
     try:
         given = checked("inertia", value)
@@ -85,7 +85,7 @@ class _GeometryTable(Table):
 class _BodyTable(Table):
     mass_kg: NonNegative
     com_m: Triple
-    inertia_kg_m2: Annotated[Any, AfterValidator(_inertia)]
+    inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)]
 
 
 class _DriveTable(Table):
@@ -210,7 +210,7 @@ class _KeepOutTable(_Origin):
 class _PayloadTable(_Origin):
     mass_kg: NonNegative
     com_m: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
-    inertia_kg_m2: Annotated[Any, AfterValidator(_inertia)] = Field(default_factory=lambda: read_only(np.zeros((3, 3))))
+    inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)] = Field(default_factory=lambda: read_only(np.zeros((3, 3))))
 
 
 class _PoseTable(Table):

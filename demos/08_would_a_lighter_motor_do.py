@@ -25,10 +25,8 @@ def main(out: str = "drives.png") -> None:
             continue
         tightest = best.tightest("motor")
         margin = "-" if tightest is None or tightest.margin is None else f"{tightest.margin:.0%}"
-        print(
-            f"{choice.variant}, {choice.joint}: {best.name} does not fail, {margin} of torque to spare; "
-            f"it saves {choice.saves:.1f} kg"
-        )
+        found = f"{best.name} does not fail, {margin} of torque to spare, and saves {choice.saves:.1f} kg"
+        print(f"{choice.variant}, {choice.joint}: {found}")
         print(f"  not known: {', '.join(best.unknown)}; warned of: {', '.join(best.warned) or 'nothing'}")
         for failed in (judged for judged in choice.judged if judged.fails and judged.mass and judged.mass < (best.mass or 0.0)):
             row = failed.first_failing

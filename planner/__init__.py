@@ -4,6 +4,7 @@ from planner.certificate import Certificate, WorstRatio, certify
 from planner.checks import average_torque
 from planner.comparison import Comparison, Log, compare, read_log
 from planner.constraints import InfeasiblePathError
+from planner.links import LinkDesign, LinkTask, design_link
 from planner.missions import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
 from planner.model_export import mjcf, urdf, write_model
 from planner.motion_files import read_motion, write_motion
@@ -28,6 +29,8 @@ __all__ = [
     "JointLine",
     "Judged",
     "Leg",
+    "LinkDesign",
+    "LinkTask",
     "Log",
     "Mission",
     "Motion",
@@ -50,6 +53,7 @@ __all__ = [
     "check_cycle",
     "choose",
     "compare",
+    "design_link",
     "examine",
     "load_mission",
     "mjcf",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from boom_model.arrays import Array
+    from planner.control.study import Study
     from planner.report import Report
     from planner.trajectory import Trajectory
 
@@ -767,10 +768,313 @@ def size(
     return ANSWER_IS_NO if any(choice.judged and choice.lightest is None for choice in choices) else 0
 
 
+@cli.command(context_settings={"ignore_unknown_options": True})
+@click.argument("start")
+@click.argument("goal")
+@click.option(
+    "--profile", "profiles", default="cubic", show_default=True, metavar="NAME,...|all", help="Profiles as in `boom plan`."
+)
+@click.option(
+    "--controller", "controllers", default="all", show_default=True, metavar="NAME,...|all",
+    help="pd, pid, computed-torque, lqr (with integral action), stepper (open loop).",
+)  # fmt: skip
+@click.option(
+    "--shaper", "shapers", default="none", show_default=True, metavar="NAME,...|all",
+    help="none, zv, zvd: impulses that cancel the lowest mode, for half a period or a whole one.",
+)  # fmt: skip
+@click.option("--bandwidth", default=6.0, show_default=True, metavar="HZ", help="Natural frequency of the loops' poles.")
+@click.option("--damping", default=1.0, show_default=True, help="Damping ratio of the loops' poles.")
+@click.option("--integral", default=0.3, show_default=True, help="Integral action's pole, as a share of the bandwidth.")
+@click.option("--duration", type=float, metavar="S", help="As in `boom plan`.")
+@pitch_option
+@hold_option
+@payload_option
+@click.option("--payload-error", default=0.0, metavar="KG", help="True payload less the one that the controllers believe in.")
+@click.option("--gust", metavar="FX,FY,FZ,START,DURATION", help="A push on the tip, (1 - cos)/2, in N along frame 1 and s.")
+@click.option("--rigid-joints", is_flag=True, help="Leave out the gearboxes' elasticity, friction and the links' bending.")
+@click.option("--rigid-links", is_flag=True, help="Leave out the bending of inner link and extension.")
+@click.option("--backlash", is_flag=True, help="With the gearboxes' backlash.")
+@click.option("--compensate-sag", is_flag=True, help="Send the motors ahead by the twist that the weight gives.")
+@click.option("--settle-mm", default=1.0, show_default=True, metavar="MM", help="Within which the tip counts as settled.")
+@click.option(
+    "--set", "figures", multiple=True, metavar="NAME=VALUE",
+    help="A figure that is assumed otherwise, as the report names it: rate_Hz, structural_damping, ...; may be given again.",
+)  # fmt: skip
+@click.option("--out", metavar="FILE.rrd", help="The recording, for `boom view`.")
+@click.option("--loops", metavar="FILE.png", help="Bode diagrams and poles as a picture.")
+@click.option("--errors", metavar="FILE.png", help="The tip's errors as a picture.")
+@vehicle_option
+@boom_option
+@json_option
+def control(
+    start: str,
+    goal: str,
+    profiles: str,
+    controllers: str,
+    shapers: str,
+    bandwidth: float,
+    damping: float,
+    integral: float,
+    duration: float | None,
+    pitch: str,
+    hold: str,
+    payload: float | None,
+    payload_error: float,
+    gust: str | None,
+    rigid_joints: bool,
+    rigid_links: bool,
+    backlash: bool,
+    compensate_sag: bool,
+    settle_mm: float,
+    figures: tuple[str, ...],
+    out: str | None,
+    loops: str | None,
+    errors: str | None,
+    vehicle: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Follow a planned move in closed loop: design, margins, simulation of the full model, and how far off the tip is.
+
+    START and GOAL are as in `boom plan`. Exit code 1: a loop is unstable, or a stepper loses a step.
+
+    \b
+    Examples:
+      boom control transport phenotyping --profile all
+      boom control transport phenotyping --controller pid,stepper --shaper all --out control.rrd
+      boom control transport phenotyping --payload-error 2 --gust 0,0,-30,5.2,0.5 --set structural_damping=0.01
+    """
+    from planner.control.closed_loop import parse_gust
+    from planner.control.design import Controller, Goals
+    from planner.control.figures import parse_figures
+    from planner.control.shaping import Shaper
+    from planner.control.study import Setup, study
+    from planner.files import check_writable
+    from planner.planning import plan as plan_move
+    from planner.timing import Profile
+    from planner.vehicle import load_case
+
+    boom, case = _load(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    if not np.isfinite(settle_mm) or not settle_mm > 0.0:
+        raise InputError(f"settle-mm is {settle_mm:g}; it must be a finite number above 0")
+    setup = Setup(
+        goals=Goals.of(bandwidth, damping, integral),
+        figures=parse_figures(figures),
+        elastic=not rigid_joints,
+        bending=not rigid_links,
+        backlash=backlash,
+        compensate_sag=compensate_sag,
+        payload_error=payload_error,
+        vehicle=case,
+        gust=None if gust is None else parse_gust(gust),
+        settled=settle_mm * 1e-3,
+    )
+    chosen = [_several("controller", controllers, list(Controller)), _several("shaper", shapers, list(Shaper))]
+    for name in (loops, errors):
+        if name is not None and not name.endswith(".png"):
+            raise InputError(f"{name}: a picture is written as .png")
+    if loops is not None and chosen[0] == [Controller.STEPPER]:
+        raise InputError("a stepper runs open loop: there is no Bode diagram of it")
+    check_writable(out, loops, errors)
+    ends, held, angle = (parse_target(start), parse_target(goal)), parse_hold(hold), parse_pitch(pitch)
+    moves = [
+        plan_move(boom, *ends, profile=profile, duration=duration, pitch=angle, hold=held, vehicle=case)
+        for profile in _several("profile", profiles, list(Profile))
+    ]
+    found = study(boom, moves, [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]], setup)
+    written = {}
+    if out is not None:
+        from planner.recording import write_control_recording
+
+        write_control_recording(out, found)
+        written["recording"] = out
+    if loops is not None or errors is not None:
+        from planner.control.picture import error_figure, loop_figure, write_figure
+
+        for kind, name, figure in (("loops", loops, loop_figure), ("errors", errors, error_figure)):
+            if name is not None:
+                write_figure(name, figure(found))
+                written[kind] = name
+    return _print_study(found, written, as_json)
+
+
+@cli.command()
+@click.option("--link", "name", default="inner", show_default=True, metavar="inner|lower|outer|extension", help="Which link.")
+@click.option("--links", metavar="FILE.toml", help="Plates and fittings of your own links; else the shipped ones.")
+@click.option(
+    "--load", type=click.Choice(["moves", "thesis"]), default="moves", show_default=True,
+    help="Every instant of the moves, or the thesis's load case.",
+)  # fmt: skip
+@click.option(
+    "--method", type=click.Choice(["exact", "thesis"]), default="exact", show_default=True,
+    help="Least mass by its optimality conditions, or the thesis's two-stage search.",
+)  # fmt: skip
+@click.option(
+    "--move", "moves", nargs=2, multiple=True, metavar="START GOAL", help="A move that loads the link; may be given again."
+)
+@click.option(
+    "--motion", "motions", multiple=True, metavar="FILE.csv", help="A motion that loads the link; may be given again."
+)
+@click.option(
+    "--largest-components", is_flag=True, help="Each load component's largest at once, as the thesis does, not every instant."
+)
+@payload_option
+@payload_as_option
+@click.option("--material", default="steel", show_default=True, metavar="steel|aluminium|cfrp", help="cfrp is assumed data.")
+@click.option("--thickness", type=float, metavar="M", help="Of one plate; else the link's own.")
+@click.option("--safety-factor", type=float, default=2.0, show_default=True, help="Against yield and buckling.")
+@click.option("--deflection", type=float, default=0.01, show_default=True, metavar="M", help="Largest deflection.")
+@click.option("--min-height", type=float, default=0.0, show_default=True, metavar="M", help="Of the plates.")
+@click.option("--max-height", type=float, metavar="M", help="Of the plates; else free.")
+@click.option("--max-taper", type=float, metavar="RATIO", help="Largest change of height over length; else free.")
+@click.option("--frozen", is_flag=True, help="Exact method: freeze the moments as the thesis does, and leave out shear.")
+@click.option(
+    "--shear/--no-shear",
+    default=None,
+    help="Exact method: whether shear counts in the deflection; else for the loads of moves, not for the thesis's.",
+)
+@click.option("--no-buckling", is_flag=True, help="Exact method: do not hold the safety factor against buckling.")
+@click.option("--slices", type=int, default=1000, show_default=True, help="Along the link.")
+@click.option("--step", type=float, default=1e-4, show_default=True, metavar="M", help="Thesis's method: its delta-H.")
+@click.option("--out", metavar="FILE.rrd", help="A recording of the design.")
+@click.option("--picture", metavar="FILE.png", help="Contour, stress, convergence, torque and mass.")
+@click.option("--convergence", is_flag=True, help="Studies by slices, delta-H and elements, in the JSON.")
+@click.option("--contour", metavar="FILE.txt", help="x, H/2, 0 for a CAD curve.")
+@click.option("--csv", "csv_file", metavar="FILE.csv", help="Heights, sections, forces and stress at the stations.")
+@click.option("--dxf", metavar="FILE.dxf", help="Outline of one plate in millimetres.")
+@click.option("--out-boom", metavar="FILE.toml", help="The boom with the new link, for `boom plan --boom`.")
+@boom_option
+@json_option
+def link(
+    name: str,
+    links: str | None,
+    load: str,
+    method: str,
+    moves: tuple[tuple[str, str], ...],
+    motions: tuple[str, ...],
+    largest_components: bool,
+    payload: float | None,
+    payload_as: Any,
+    material: str,
+    thickness: float | None,
+    safety_factor: float,
+    deflection: float,
+    min_height: float,
+    max_height: float | None,
+    max_taper: float | None,
+    frozen: bool,
+    shear: bool | None,
+    no_buckling: bool,
+    slices: int,
+    step: float,
+    out: str | None,
+    picture: str | None,
+    convergence: bool,
+    contour: str | None,
+    csv_file: str | None,
+    dxf: str | None,
+    out_boom: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Design a link: the least mass that holds stress, deflection and buckling, and what it does to the joint's torque.
+
+    Without --move and --motion the moves are transport to phenotyping with every profile, each in its least time; for the
+    thesis's load its own, a cubic of 5 s.
+
+    \b
+    Examples:
+      boom link --load thesis --method thesis
+      boom link --picture link.png --out-boom lighter.toml
+      boom link --link lower --material aluminium --min-height 0.02 --dxf lower.dxf
+    """
+    from planner import link_files, link_report
+    from planner.files import check_writable
+    from planner.links import LinkTask, default_moves, design_link
+    from planner.planning import plan_each_profile
+    from planner.trajectory import read_csv
+
+    files = {"recording": out, "picture": picture, "contour": contour, "csv": csv_file, "dxf": dxf, "boom": out_boom}
+    check_writable(*files.values())
+    boom = _load(boom_file, payload)
+    task = LinkTask(
+        link=name,
+        load=load,
+        method=method,
+        material=material,
+        safety_factor=safety_factor,
+        deflection=deflection,
+        slices=slices,
+        step=step,
+        min_height=min_height,
+        max_height=max_height,
+        max_taper=max_taper,
+        thickness=thickness,
+        own_mass=not frozen,
+        shear=shear,
+        buckling=not no_buckling,
+        largest_components=largest_components,
+        payload_as=payload_as,
+        links=links,
+    )
+    trajectories = [read_csv(motion) for motion in motions]
+    for start, goal in moves:
+        trajectories += plan_each_profile(boom, parse_target(start), parse_target(goal))
+    try:
+        design = design_link(boom, task, trajectories or default_moves(boom, task))
+    except InfeasibleError as error:
+        if as_json:
+            _print_json({"link": name, "load": load, "method": method, "mass_kg": None, "files": {}, "reason": str(error)})
+        raise
+    written = {kind: file for kind, file in files.items() if file is not None}
+    if out is not None:
+        from planner.recording import write_link_recording
+
+        write_link_recording(out, design)
+    if picture is not None:
+        from planner.link_picture import write_link_picture
+
+        write_link_picture(picture, design)
+    for file, write in (
+        (contour, link_files.write_contour),
+        (csv_file, link_files.write_stations),
+        (dxf, link_files.write_outline),
+    ):
+        if file is not None:
+            write(file, design)
+    if out_boom is not None:
+        link_files.write_boom(out_boom, boom_file, design)
+    if as_json:
+        answer = link_report.to_json(design, written)
+        if convergence:
+            from planner.link_convergence import study
+
+            answer["convergence"] = link_report.convergence_json(study(design))
+        _print_json(answer)
+        return 0
+    console = _console()
+    console.print(link_report.title(design), highlight=False)
+    for header, rows in (
+        (link_report.ROWS_HEADER, link_report.rows(design)),
+        (link_report.MOTORS_HEADER, link_report.motor_rows(design)),
+    ):
+        table = _table(*header)
+        for row in rows:
+            table.add_row(*row)
+        if rows:
+            console.print(table)
+    for line in link_report.sentences(design):
+        console.print(line, highlight=False, soft_wrap=True)
+    _print_lines("Note", design.notes)
+    for kind, file in written.items():
+        click.echo(f"{kind}: {file}")
+    return 0
+
+
 @cli.command()
 @json_option
 def validate(as_json: bool) -> int:
-    """The thesis's tables 2-5 to 2-8 and section 3.5's loads, row by row, against this model."""
+    """The thesis's tables 2-5 to 2-8 and 3-2 and its sections 3.5 and 3.6, row by row, against this model."""
     from planner.validation import validate as validate_model
 
     rows = validate_model(Boom.load())
@@ -862,7 +1166,54 @@ def _print_report(report: "Report", written: dict[str, str], as_json: bool) -> i
     return ANSWER_IS_NO if report.verdict is Verdict.FAIL else 0
 
 
-_STYLES = {"FAIL": "bold red", "WARN": "yellow", "NOT CHECKABLE": "magenta", "INCOMPLETE": "magenta", "INFO": "dim"}
+def _print_study(study: "Study", written: dict[str, str], as_json: bool) -> int:
+    from planner.control.study import LOOP_HEADER, ROW_HEADER, ROW_LEGEND, loop_cells, row_cells
+
+    if as_json:
+        _print_json(study.to_json(written))
+        return ANSWER_IS_NO if study.failed else 0
+    console = _console()
+    table = _table(*ROW_HEADER)
+    for row in study.rows:
+        table.add_row(*row_cells(row), style=_STYLES.get(row.outcome))
+    console.print(table)
+    console.print(ROW_LEGEND, highlight=False)
+    if study.designs:
+        console.print("Loops at the goal, each joint's broken with the others closed", highlight=False)
+        table = _table(*LOOP_HEADER)
+        for design in study.designs:
+            for i, cells in enumerate(loop_cells(design)):
+                table.add_row(*cells, end_section=i == 4)
+        console.print(table)
+    _print_lines("Case", study.reasons)
+    _print_lines("Note", study.notes)
+    _print_lines("Assumed", study.assumptions)
+    console.print(study.modes_sentence, highlight=False, soft_wrap=True)
+    console.print(study.summary, style="bold red" if study.failed else None, highlight=False, soft_wrap=True)
+    for kind, name in written.items():
+        click.echo(f"{kind}: {name}")
+    return ANSWER_IS_NO if study.failed else 0
+
+
+def _several(what: str, text: str, known: Sequence[str]) -> list[str]:
+    """The names of a list with commas, or all of them."""
+    names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",")))
+    for name in names:
+        if name not in known:
+            raise InputError(f"{what} is {name!r}; there are: {', '.join(known)}, or all")
+    return names
+
+
+_STYLES = {
+    "FAIL": "bold red",
+    "UNSTABLE": "bold red",
+    "LOST STEP": "bold red",
+    "WARN": "yellow",
+    "saturates": "yellow",
+    "NOT CHECKABLE": "magenta",
+    "INCOMPLETE": "magenta",
+    "INFO": "dim",
+}
 
 
 def _print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

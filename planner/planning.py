@@ -127,6 +127,15 @@ def plan(
     return _move(boom, timing.profile, vehicle, coarse, fine, motions, tilt)
 
 
+def plan_each_profile(boom: Boom, start: Target, goal: Target) -> list[Trajectory]:
+    """The move in the least time of each profile, as samples.
+
+    Raises:
+        InputError, InfeasibleError: as `plan`.
+    """
+    return [plan(boom, start, goal, profile=profile).trajectory for profile in Profile]
+
+
 def check(
     boom: Boom,
     trajectory: Trajectory,

@@ -1,4 +1,4 @@
-"""The reach of the arm's vertical plane as a picture; the only importer of matplotlib."""
+"""The reach of the arm's vertical plane as a picture."""
 
 from pathlib import Path
 

@@ -1,6 +1,6 @@
 """Jerk-limited law along a path (ruckig, community edition)."""
 
-from ruckig import InputParameter, Result, Ruckig, Trajectory
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from boom_model import BaseMotion, Boom, InfeasibleError
 from planner.constraints import jerk_stretch, least_stretch, path_limits
@@ -47,7 +47,10 @@ def evenly_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> tu
     problem.current_position, problem.target_position = [0.0], [1.0]
     problem.max_velocity, problem.max_acceleration, problem.max_jerk = [velocity], [acceleration], [jerk]
     solver, solution = Ruckig(1), Trajectory(1)
-    result = solver.calculate(problem, solution)
+    try:
+        result = solver.calculate(problem, solution)
+    except RuckigError as error:
+        raise InfeasibleError(f"no jerk-limited motion: {' '.join(str(error).split())[:100]}") from None
     if result != Result.Working:  # ruckig's name for success offline
         raise InfeasibleError(f"no jerk-limited motion: ruckig answers {result.name}")
     law = TimeLaw.from_pieces(*pieces(solution.profiles[0][0]), jerk_limited=True).stretched(unit)

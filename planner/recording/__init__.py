@@ -6,8 +6,17 @@ be shown. The solids' lengths are the model's, their thickness is for the eye on
 """
 
 from planner.recording.comparison import write_comparison_recording
+from planner.recording.control import write_control_recording
+from planner.recording.link import write_link_recording
 from planner.recording.move import write_recording
 from planner.recording.moves import write_moves_recording
 from planner.recording.reach import write_reach_recording
 
-__all__ = ["write_comparison_recording", "write_moves_recording", "write_reach_recording", "write_recording"]
+__all__ = [
+    "write_comparison_recording",
+    "write_control_recording",
+    "write_link_recording",
+    "write_moves_recording",
+    "write_reach_recording",
+    "write_recording",
+]

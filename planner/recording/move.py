@@ -96,7 +96,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
             eye_of(boom, trajectory.q),
             ground_level(boom, tip),
         ),
-        legend_view(bands, "Path of the tip: torque / limit of the worst drive [-]"),
+        legend_view("Path of the tip: torque / limit of the worst drive [-]"),
         row_shares=[8, 1],
     )
 

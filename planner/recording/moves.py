@@ -66,7 +66,7 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
             eye_of(longest.boom, *(move.trajectory.q for move in moves.values())),
             ground_level(longest.boom, reached),
         )
-        left = rrb.Vertical(view, legend_view(legend, "Colours"), row_shares=[8, 1])
+        left = rrb.Vertical(view, legend_view("Colours"), row_shares=[8, 1])
         recording.send_blueprint(shown_beside(left, right, [1, 1]))
         log_legend(recording, legend)
         log_markdown(recording, "reading", reading)

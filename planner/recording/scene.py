@@ -77,9 +77,11 @@ def log_path(recording: rr.RecordingStream, entity: str, positions: Array, color
     recording.log(entity, strip, rr.CoordinateFrame("mount"), static=True)
 
 
-def log_solids(recording: rr.RecordingStream, boom: Boom) -> None:
-    """The solids of the boom: links, pins, payload."""
+def log_solids(recording: rr.RecordingStream, boom: Boom, *, without: str | None = None) -> None:
+    """The solids of the boom: links but the one `without`, pins, payload."""
     for name, bars in _bars(boom).items():
+        if name == without:
+            continue
         _log_bars(recording, BOOM, name, bars, COLORS[name], "solid")
     for name, along in _pins(boom).items():
         centers = np.array([(e, 0.0, 0.0) for e in along]) @ R_LINK_BODY[name]

@@ -7,6 +7,7 @@ from boom_model import JOINTS, Boom
 from boom_model.arrays import Array
 from boom_model.drives import drive_torque_limit
 from planner.constraints import load_ratio
+from planner.recording.legend import Legend
 from planner.recording.palette import BLUE, GREEN, LIGHT, ORANGE, SKY_BLUE, VERMILION, YELLOW, Color
 from planner.rows import SAMPLING_SLACK
 from planner.trajectory import Trajectory
@@ -64,6 +65,6 @@ def _band_colors(worst: Array) -> list[Color]:
     return [BANDS[k][2] for k in np.searchsorted([bound for bound, _, _ in BANDS], worst)]
 
 
-def legend(known: bool) -> list[tuple[str, Color]]:
+def legend(known: bool) -> Legend:
     """Name and colour of every band, or what stands for them where no drive's limit is known."""
     return [(name, color) for _, name, color in BANDS] if known else [UNKNOWN]

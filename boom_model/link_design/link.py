@@ -1,0 +1,168 @@
+"""The boom's links as beams, and a designed beam as the body of a link again."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field
+
+from boom_model.arrays import Array, read_only
+from boom_model.boom import Body, Boom
+from boom_model.boom_file import Triple, inertia_tensor
+from boom_model.errors import InputError
+from boom_model.frames import R_LINK_BODY
+from boom_model.link_design.beam import Beam, Support
+from boom_model.link_design.materials import Material
+from boom_model.provenance import Basis, Origin
+from boom_model.toml_file import NonNegative, Positive, Table, read_toml
+
+LINKS_FILE = Path(str(files("boom_model") / "data" / "links.toml"))
+
+LINKS = ("inner", "lower", "outer", "extension")
+"""Links that can be designed. Each is held at its root, but for the outer one, a strut between two pins."""
+
+_TURNED = read_only(np.diag([-1.0, 1.0, -1.0]))
+"""From the link axes (e, p, n) to those of the extension's beam, whose end, the wrist, is where e comes from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """What a link is made of, and what of it stays as it is."""
+
+    name: str
+    length: float
+    """Between its pins; of the extension what stands out at full stroke [m]"""
+    support: Support
+    width: float
+    """Of all plates [m]"""
+    plates: int
+    spacing: float
+    """Between the middles of the outermost plates [m]"""
+    designed: tuple[float, float]
+    """The part of its length whose contour is the design's; what lies beyond is of the fittings."""
+    origin: Origin
+    """Of the plates and their spacing"""
+    fittings: Body | None
+    """Along the beam's axes, about its root; None where none are known"""
+    fittings_origin: Origin | None
+    cross_plates: int = 0
+    """Plates between the plates, evenly along the designed part, as thick as one and as high as the contour there"""
+
+    def beam(self, material: Material, slices: int) -> Beam:
+        return Beam(self.length, self.width, material, slices=slices, plates=self.plates, support=self.support)
+
+
+def load_link(boom: Boom, name: str, path: str | Path | None = None) -> Link:
+    """A link of a boom with the plates and fittings of a TOML file; None is the shipped `boom_model/data/links.toml`.
+
+    Raises:
+        InputError: there is no such link, or the file cannot be read or breaks the form; names the key.
+    """
+    file = LINKS_FILE if path is None else Path(path)
+    table = read_toml(file, _LinksTable).links
+    if name not in LINKS or name not in table:
+        raise InputError(f"unknown link {name!r}; there are: {', '.join(n for n in LINKS if n in table)}")
+    g, t = boom.geometry, table[name]
+    lengths = {"inner": g.L9, "lower": g.L3, "outer": g.L4, "extension": float(boom.limits.upper[3])}
+    if not lengths[name] > 0.0:
+        raise InputError(f"the {name} link's length is {lengths[name]:g} m; it must be above 0 m to be designed")
+    fittings = t.fittings
+    return Link(
+        name=name,
+        length=lengths[name],
+        support="pinned" if name == "outer" else "cantilever",
+        width=t.width_m,
+        plates=t.plates,
+        spacing=t.spacing_m,
+        designed=(t.designed_from, t.designed_to),
+        origin=Origin(Basis(t.basis), t.source),
+        fittings=None if fittings is None else Body(fittings.mass_kg, read_only(fittings.com_m), fittings.inertia_kg_m2),
+        fittings_origin=None if fittings is None else Origin(Basis(fittings.basis), fittings.source),
+        cross_plates=t.cross_plates,
+    )
+
+
+def link_body(link: Link, beam: Beam, H: Array) -> Body:
+    """The whole link as a body in its frame: designed part of the plates, cross plates and fittings.
+
+    A plate's element is a bar as long as a slice, H high, a plate thick, half a spacing off the middle plane.
+    """
+    first, last = (round(share * beam.slices) for share in link.designed)
+    dx, rho = beam.step, beam.material.density
+    x = (np.arange(first, last) + 0.5) * dx
+    h = (H[first:last] + H[first + 1 : last + 1]) / 2.0
+    thickness = beam.width / beam.plates
+    m = rho * beam.width * dx * h
+    off = np.linspace(-0.5, 0.5, beam.plates) * link.spacing if beam.plates > 1 else np.zeros(1)
+    zz = float((off**2).mean()) + thickness**2 / 12.0
+    parts = [_moments(m, x, dx**2 / 12.0, h**2 / 12.0, zz)]
+    if link.cross_plates:
+        gap = max(link.spacing - thickness, 0.0)
+        at = (
+            np.array(link.designed[0]) + (np.arange(link.cross_plates) + 0.5) / link.cross_plates * np.ptp(link.designed)
+        ) * beam.length
+        high = np.interp(at, beam.stations, H)
+        parts.append(_moments(rho * gap * thickness * high, at, thickness**2 / 12.0, high**2 / 12.0, gap**2 / 12.0))
+    if link.fittings is not None:
+        parts.append(_pseudo_inertia(link.fittings))
+    P = np.sum(parts, axis=0)
+    mass, com = P[0, 0], P[0, 1:] / P[0, 0]
+    second = P[1:, 1:] - mass * np.outer(com, com)
+    if link.name == "extension":  # its beam runs from its root to the wrist, where its frame stands
+        com = _TURNED @ (com - np.array([link.length, 0.0, 0.0]))
+        second = _TURNED @ second @ _TURNED
+    R = R_LINK_BODY[link.name].T
+    inertia = R @ (np.trace(second) * np.eye(3) - second) @ R.T
+    return Body(float(mass), read_only(R @ com), read_only((inertia + inertia.T) / 2.0))
+
+
+def with_body(boom: Boom, name: str, body: Body) -> Boom:
+    """The boom with another body."""
+    bodies: Mapping[str, Body] = {**boom.bodies, name: body}
+    return replace(boom, bodies=bodies)
+
+
+def _moments(m: Any, x: Any, xx: Any, yy: Any, zz: Any) -> Array:
+    """int (1, r)(1, r)^T dm of bars at (x, 0, 0) with second moments of their own: (4, 4)."""
+    P = np.zeros((4, 4))
+    P[0, 0] = m.sum()
+    P[0, 1] = P[1, 0] = m @ x
+    P[1, 1] = m @ (x**2 + xx)
+    P[2, 2] = m @ np.broadcast_to(yy, m.shape)
+    P[3, 3] = m.sum() * zz
+    return P
+
+
+def _pseudo_inertia(body: Body) -> Array:
+    P = np.empty((4, 4))
+    P[0, 0] = body.mass
+    P[0, 1:] = P[1:, 0] = body.mass * body.com
+    P[1:, 1:] = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia + body.mass * np.outer(body.com, body.com)
+    return P
+
+
+class _FittingsTable(Table):
+    mass_kg: NonNegative
+    com_m: Triple
+    inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)]
+    basis: Literal["printed", "estimated", "assumed"]
+    source: str
+
+
+class _LinkTable(Table):
+    width_m: Positive
+    plates: Annotated[int, Field(ge=1)]
+    spacing_m: NonNegative
+    designed_from: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    designed_to: Annotated[float, Field(gt=0, le=1)] = 1.0
+    cross_plates: Annotated[int, Field(ge=0)] = 0
+    basis: Literal["printed", "estimated", "assumed"]
+    source: str
+    fittings: _FittingsTable | None = None
+
+
+class _LinksTable(Table):
+    links: dict[str, _LinkTable] = Field(default_factory=dict)

@@ -1,0 +1,373 @@
+"""A planned move followed in closed loop by the full nonlinear plant; many cases side by side in one batch."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from boom_model import BaseMotion, Boom, InputError, gravity_torque, inverse_dynamics, up_on_slope
+from boom_model.arrays import Array, checked
+from planner.control.design import Controller, Gains, Goals, design
+from planner.control.plant import Plant, accelerations, equilibrium, friction, spring_torque, torque_limits, twist_under
+from planner.control.shaping import Impulses
+from planner.planning import Move
+from planner.time_law import Motion
+from planner.vehicle import VehicleCase, base_motion
+
+DIVERGED = 1.0
+"""An error [rad, the extension's in m] at which a case counts as out of control, and is simulated no further."""
+
+FARTHEST = 1e6
+"""Any coordinate or rate beyond this [SI] is held there, so that a case on its way out of control stays finite to its end."""
+
+LONGEST_STEP = 1e-3
+"""Of the integrator [s], unless told otherwise: an eighth of the period of a stepper's rotor about its command."""
+
+_BASE = ("velocity", "angular_velocity", "acceleration", "angular_acceleration", "up")
+
+
+@dataclass(frozen=True, eq=False)
+class Command:
+    """What a controller is asked to follow: a planned move, shaped where asked."""
+
+    motions: tuple[Motion, ...]
+    impulses: Impulses
+    at_rest: Array
+    """(5,) where an empty move stands."""
+
+    @staticmethod
+    def of(move: Move, impulses: Impulses) -> "Command":
+        return Command(move.motions, impulses, move.trajectory.q[-1])
+
+    @property
+    def duration(self) -> float:
+        """[s], the shaper's delay included."""
+        return sum(motion.duration for motion in self.motions) + float(self.impulses.times[-1])
+
+    def __call__(self, t: Array) -> tuple[Array, Array, Array]:
+        """q, qd, qdd (n, 5) at times t (n,), at rest before 0 and after the end."""
+        parts = [self._unshaped(t - late) for late in self.impulses.times]
+        q, qd, qdd = (np.tensordot(self.impulses.amplitudes, np.stack(part), 1) for part in zip(*parts, strict=True))
+        return q, qd, qdd
+
+    def _unshaped(self, t: Array) -> tuple[Array, Array, Array]:
+        if not self.motions:
+            still = np.zeros((t.size, 5))
+            return still + self.at_rest, still, still
+        ends = np.cumsum([motion.duration for motion in self.motions])
+        piece = np.minimum(np.searchsorted(ends, t, side="right"), len(ends) - 1)
+        q, qd, qdd = (np.empty((t.size, 5)) for _ in range(3))
+        for i, motion in enumerate(self.motions):
+            chosen = piece == i
+            q[chosen], qd[chosen], qdd[chosen], _ = motion(t[chosen] - (ends[i] - motion.duration))
+        outside = (t < 0.0) | (t >= ends[-1])
+        qd[outside], qdd[outside] = 0.0, 0.0
+        return q, qd, qdd
+
+
+@dataclass(frozen=True)
+class Gust:
+    """A push on the tip, force (1 - cos(2 pi (t - start) / duration)) / 2 along frame 1."""
+
+    force: tuple[float, float, float]
+    """Largest [N]."""
+    start: float
+    duration: float
+
+    def __call__(self, t: Array) -> Array:
+        """(n, 3) [N] at times t (n,)."""
+        phase = np.clip((t - self.start) / self.duration, 0.0, 1.0)
+        pushes: Array = 0.5 * (1.0 - np.cos(2.0 * np.pi * phase))[:, None] * np.array(self.force)
+        return pushes
+
+
+def parse_gust(text: str) -> Gust:
+    """A gust from FX,FY,FZ,START,DURATION in N and s.
+
+    Raises:
+        InputError: not five finite numbers, or a duration that is not above 0.
+    """
+    try:
+        values = checked("gust", [float(part) for part in text.split(",")], 5)
+    except (ValueError, InputError):
+        raise InputError(f"gust {text!r} is not FX,FY,FZ,START,DURATION, five finite numbers in N and s") from None
+    x, y, z, start, duration = map(float, values)
+    if not duration > 0.0:
+        raise InputError(f"gust's duration is {duration:g} s; it must be above 0 s")
+    return Gust((x, y, z), start, duration)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One controller on one command."""
+
+    command: Command
+    gains: tuple[Gains, ...]
+    """Designs at poses evenly spread over the command's duration; a single one holds all along."""
+
+    @staticmethod
+    def of(plant: Plant, controller: Controller, goals: Goals, command: Command, knots: int = 17) -> "Case":
+        """A controller designed at the command's end; lqr, whose gains hold one pose's coupling, at `knots` poses of it."""
+        t = np.linspace(0.0, command.duration, knots) if controller is Controller.LQR else np.array([command.duration])
+        return Case(command, tuple(design(plant, controller, goals, q) for q in command(t)[0]))
+
+    @property
+    def controller(self) -> Controller:
+        return self.gains[0].controller
+
+    def gains_at(self, t: float) -> Gains:
+        """Gains at time t [s], linear between designs."""
+        place = np.clip(t / max(self.command.duration, 1e-9), 0.0, 1.0) * (len(self.gains) - 1)
+        i = min(int(place), max(len(self.gains) - 2, 0))
+        low, high, share = self.gains[i], self.gains[min(i + 1, len(self.gains) - 1)], place - i
+        if low is high or share == 0.0:
+            return low
+        Kp, Kd, Ki, at = ((1.0 - share) * getattr(low, name) + share * getattr(high, name) for name in ("Kp", "Kd", "Ki", "at"))
+        return Gains(low.controller, Kp, Kd, Ki, at)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """B cases followed for the same time; n samples, one a controller's period. A case that diverged keeps its last state."""
+
+    t: Array
+    """(n,)"""
+    command: Array
+    """(n, B, 5) commanded joint position."""
+    q: Array
+    """(n, B, 5) of the links."""
+    qd: Array
+    motor: Array
+    """(n, B, 5) of the motors at the joints' side; the joint's own where it is not elastic."""
+    torque: Array
+    """(n, B, 5) asked of the drives [Nm], at the joints' side of the gears, before any limit."""
+    limit: Array
+    """(n, B, 5) that the motors have at their speed; infinite where it is not known."""
+    spring: Array
+    """(n, B, m) T_s"""
+    ended: Array
+    """(B,) time at which a case diverged [s]; NaN of one that did not."""
+    lost: Array
+    """(B, 5) time at which a stepper lost its first step [s]; NaN where it did not, and of other controllers."""
+
+
+class _Table(NamedTuple):
+    """References on the grid of half substeps, (k, R, 5) each, R different commands."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+    gravity: Array
+    full: Array
+    """Rigid feedforward with the drives' inertia and friction."""
+    rub: Array
+
+
+def simulate(
+    plant: Plant,
+    cases: Sequence[Case],
+    duration: float,
+    *,
+    model: Boom | None = None,
+    vehicle: VehicleCase | None = None,
+    gust: Gust | None = None,
+    substeps: int | None = None,
+    continuous: bool = False,
+    compensate_sag: bool = False,
+) -> Run:
+    """Follows every case from rest, by the classical Runge-Kutta method at `substeps` steps a sampling period.
+
+    The controllers see the motors' positions, quantised; of the vehicle they know its slope. A torque beyond what the motor has
+    at its speed is cut to that, and the sum of the error stands still meanwhile. A stepper's torque is
+    T_available(speed) sin(p N (command - theta)) p = 50 for a step of 1.8 degrees, and damping about the command's speed, at
+    most T_available; the command moves in microsteps. It has lost a step where p N |command - theta| > pi.
+
+    Args:
+        duration: simulated time [s].
+        model: the boom that the controllers believe in; None is the plant's own.
+        substeps: None takes as many as make a step of at most 1 ms.
+        continuous: whether torques follow exact states at every stage of the integrator, without sampling and filter.
+        compensate_sag: whether the motors are sent ahead by the twist that the model's gravity gives.
+
+    Raises:
+        InputError: no cases, or a duration that is not above 0.
+    """
+    if not cases or not duration > 0.0:
+        raise InputError(f"{len(cases)} cases for {duration:g} s: nothing to simulate")
+    boom, figures = plant.boom if model is None else model, plant.figures
+    T, B, E = figures.sampling_period, len(cases), list(plant.elastic)
+    stepping = np.array([case.controller is Controller.STEPPER for case in cases])
+    inverse = np.array([case.controller is Controller.COMPUTED_TORQUE for case in cases])
+    if stepping.any() and not E:
+        raise InputError("a stepper is simulated behind an elastic gearbox; no joint is elastic here")
+    if substeps is None:
+        substeps = max(1, int(np.ceil(T / LONGEST_STEP - 1e-9)))
+    count, h = int(np.ceil(duration / T - 1e-9)) + 1, T / substeps
+    half: Array = np.arange(2.0 * substeps * (count - 1) + 1.0) * (h / 2.0)
+
+    tilt = None if vehicle is None else BaseMotion.of(up=up_on_slope(vehicle.roll, vehicle.pitch))
+    commands = list(dict.fromkeys(case.command for case in cases))
+    table = _table(plant, boom, commands, half, tilt, compensate_sag)
+    row = np.array([commands.index(case.command) for case in cases])
+    grounds = _grounds(vehicle, half)
+    pushes = None if gust is None else gust(half)
+    scheduled = [b for b, case in enumerate(cases) if len(case.gains) > 1]
+    Kp, Kd, Ki = (np.stack([getattr(case.gains[0], name) for case in cases]) for name in ("Kp", "Kd", "Ki"))
+    light = np.array([case.controller in (Controller.PD, Controller.PID) for case in cases])[:, None]
+
+    resolution = _resolutions(plant)
+    keep = np.exp(-2.0 * np.pi * figures.velocity_filter_Hz * T)
+    teeth, holding, drag, micro = _stepper_figures(plant)
+    alive, ended, lost = np.ones(B, dtype=bool), np.full(B, np.nan), np.full((B, 5), np.nan)
+    held, cap = np.zeros((B, 5)), np.full((B, 5), np.inf)
+
+    def law(i: int, p: Array, v: Array, total: Array) -> Array:
+        """Torques (B, 5) from positions p, velocities v and the integral action, for the reference at half step i."""
+        q_r, qd_r, qdd_r = table.q[i][row], table.qd[i][row], table.qdd[i][row]
+        w = _times(Kp, q_r - p) + _times(Kd, qd_r - v) + total
+        u: Array = np.where(light, table.gravity[i][row], table.full[i][row]) + w
+        if inverse.any():
+            a = (qdd_r + w)[inverse]
+            rigid = inverse_dynamics(boom, p[inverse], v[inverse], a, base=tilt, reactions=False, friction=True).tau
+            u[inverse] = rigid + plant.rotor * a + table.rub[i][row[inverse]]
+        return u
+
+    def torque(i: int, x: Array) -> Array:
+        """At half step i: what is held, and what a stepper pulls with."""
+        u = held
+        if continuous:
+            q, qd, theta, theta_d = _split(x, len(E))
+            p, v = _seen(q, theta, E), _seen(qd, theta_d, E)
+            u = np.clip(law(i, p, v, total), -cap, cap)
+        if stepping.any():
+            u = u.copy()
+            theta, theta_d = x[stepping, 10 : 10 + len(E)], x[stepping, 10 + len(E) :]
+            goal, speed = table.q[i][row[stepping]][:, E], table.qd[i][row[stepping]][:, E]
+            goal = np.rint(goal / micro) * micro
+            most = cap[stepping][:, E]
+            u[np.ix_(stepping, np.array(E))] = np.clip(
+                most * np.sin(teeth * (goal - theta)) + drag * (speed - theta_d), -most, most
+            )
+        return u
+
+    def rates(i: int, x: Array) -> Array:
+        x = np.clip(np.nan_to_num(x), -FARTHEST, FARTHEST)
+        q, qd, theta, theta_d = _split(x, len(E))
+        base = None if grounds is None else BaseMotion(*(ground[i] for ground in grounds))
+        push = None if pushes is None else pushes[i]
+        qdd, theta_dd = accelerations(plant, q, qd, theta, theta_d, torque(i, x), base=base, tip_force=push)
+        return np.concatenate([qd, qdd, theta_d, theta_dd], axis=1) * alive[:, None]
+
+    theta_0 = table.q[0][row]
+    if stepping.any():  # turned on its command as far as the load at rest pulls it
+        pull = gravity_torque(plant.boom, equilibrium(plant, theta_0, tilt), base=tilt)[:, E]
+        lag = np.arcsin(np.clip(pull / holding, -1.0, 1.0)) / teeth
+        theta_0[np.ix_(stepping, np.array(E))] -= lag[stepping]
+    x = np.concatenate([equilibrium(plant, theta_0, tilt), np.zeros((B, 5)), theta_0[:, E], np.zeros((B, len(E)))], axis=1)
+    before, v, total = _quantised(_seen(x[:, :5], x[:, 10 : 10 + len(E)], E), resolution), np.zeros((B, 5)), np.zeros((B, 5))
+
+    shape = (count, B, 5)
+    q_s, qd_s, motor_s, torque_s, limit_s = (np.empty(shape) for _ in range(5))
+    spring_s = np.empty((count, B, len(E)))
+    for k in range(count):
+        i = 2 * substeps * k
+        q, qd, theta, theta_d = _split(x, len(E))
+        motor, motor_d = _seen(q, theta, E), _seen(qd, theta_d, E)
+        off = np.abs(motor - table.q[i][row])
+        fallen = alive & (~np.isfinite(x).all(axis=1) | (off > DIVERGED).any(axis=1))
+        ended[fallen], alive[fallen] = k * T, False
+        x[fallen, 5:10], x[fallen, 10 + len(E) :] = 0.0, 0.0
+        if stepping.any():
+            slipped = stepping[:, None] & (teeth * off[:, E] > np.pi) & np.isnan(lost[:, E])
+            lost[:, E] = np.where(slipped, k * T, lost[:, E])
+        cap = torque_limits(plant, motor_d)
+        for b in scheduled:
+            now = cases[b].gains_at(k * T)
+            Kp[b], Kd[b], Ki[b] = now.Kp, now.Kd, now.Ki
+        p = _quantised(motor, resolution)
+        v = keep * v + (1.0 - keep) * (p - before) / T
+        before = p
+        asked = law(i, motor, motor_d, total) if continuous else law(i, p, v, total)
+        held = np.clip(asked, -cap, cap)
+        if stepping.any():
+            asked[stepping] = torque(i, x)[stepping]
+        total = total + np.where(np.abs(asked) > cap, 0.0, T * _times(Ki, table.q[i][row] - p))
+        q_s[k], qd_s[k], motor_s[k], torque_s[k], limit_s[k] = q, qd, motor, asked, cap
+        spring_s[k] = spring_torque(plant, q, theta - q[:, E])
+        if k + 1 < count:
+            for j in range(substeps):
+                x = _runge_kutta(rates, i + 2 * j, h, x)
+    command = np.stack([c(half[:: 2 * substeps])[0] for c in commands], axis=1)[:, row]
+    return Run(half[:: 2 * substeps], command, q_s, qd_s, motor_s, torque_s, limit_s, spring_s, ended, lost)
+
+
+def _runge_kutta(rates: Callable[[int, Array], Array], i: int, h: float, x: Array) -> Array:
+    k1 = rates(i, x)
+    k2 = rates(i + 1, x + 0.5 * h * k1)
+    k3 = rates(i + 1, x + 0.5 * h * k2)
+    k4 = rates(i + 2, x + h * k3)
+    return x + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+
+
+def _table(plant: Plant, boom: Boom, commands: Sequence[Command], t: Array, tilt: BaseMotion | None, sag: bool) -> _Table:
+    E = list(plant.elastic)
+    q, qd, qdd = (np.stack(part, axis=1) for part in zip(*(command(t) for command in commands), strict=True))
+    gravity = gravity_torque(boom, q, base=tilt)
+    load = inverse_dynamics(boom, q, qd, qdd, base=tilt, reactions=False, friction=True).tau
+    rub = np.zeros_like(q)
+    if E:
+        rub[..., E] = friction(plant, qd[..., E], load[..., E])
+        if sag:
+            q = q.copy()
+            q[..., E] += twist_under(plant, q, gravity[..., E])
+    return _Table(q, qd, qdd, gravity, load + plant.rotor * qdd + rub, rub)
+
+
+def _grounds(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | None:
+    if vehicle is None:
+        return None
+    base = base_motion(vehicle, t)
+    return tuple(np.broadcast_to(getattr(base, name), (t.size, 3)) for name in _BASE)
+
+
+def _stepper_figures(plant: Plant) -> tuple[Array, Array, Array, Array]:
+    """Of each elastic joint (m,): p N [1/rad], N T_run, rotor damping at the joint, microstep at the joint."""
+    drives = [drive for i in plant.elastic if (drive := plant.boom.drives[i])]
+    ratio = np.array([drive.gearbox.ratio for drive in drives])
+    step = np.array([drive.motor.step for drive in drives])
+    holding = ratio * np.array([drive.motor.running_torque or 0.0 for drive in drives])
+    teeth = np.pi / (2.0 * step) * ratio  # a full step is a quarter of an electrical turn
+    drag = 2.0 * plant.figures.rotor_damping * np.sqrt(holding * teeth * plant.rotor[list(plant.elastic)])
+    return teeth, holding, drag, step / ratio / plant.figures.microsteps
+
+
+def _resolutions(plant: Plant) -> Array:
+    """(5,) what an encoder can tell apart at the joint, 0 where it is exact."""
+    figures, joint = plant.figures, np.empty(5)
+    for i, drive in enumerate(plant.boom.drives):
+        counts = figures.joint_counts if drive is None else figures.encoder_counts * drive.gearbox.ratio
+        joint[i] = 2.0 * np.pi / counts if counts else 0.0
+    joint[3] = figures.extension_count_mm * 1e-3
+    return joint
+
+
+def _quantised(p: Array, resolution: Array) -> Array:
+    size = np.where(resolution > 0.0, resolution, 1.0)
+    rounded: Array = np.where(resolution > 0.0, np.rint(p / size) * size, p)
+    return rounded
+
+
+def _seen(q: Array, theta: Array, E: list[int]) -> Array:
+    p = q.copy()
+    p[:, E] = theta
+    return p
+
+
+def _split(x: Array, m: int) -> tuple[Array, Array, Array, Array]:
+    return x[:, :5], x[:, 5:10], x[:, 10 : 10 + m], x[:, 10 + m :]
+
+
+def _times(K: Array, e: Array) -> Array:
+    product: Array = (K @ e[..., None])[..., 0]
+    return product

@@ -1,0 +1,86 @@
+"""The plant linearised at a state: x' = A x + B u of small deviations, with exact derivatives of the model."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model import InputError, inverse_dynamics, mass_matrix
+from boom_model.arrays import Array, broadcast
+from planner.control.plant import Plant, compliance, slopes, tangent_stiffness
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """x = (q, qd, theta, thetad) as deviations, n = 10 + 2 m of them; u (5,) the drives' torques."""
+
+    A: Array
+    """(n, n)"""
+    B: Array
+    """(n, 5)"""
+    measured: Array
+    """(5, n): what the encoders see, the motor's angle at an elastic joint and the joint itself elsewhere."""
+
+
+def linearise(plant: Plant, q: ArrayLike, qd: ArrayLike | None = None, qdd: ArrayLike | None = None) -> Linear:
+    """The plant about a state q, qd, qdd (5,) of its links, at rest unless told otherwise; Coulomb friction is left out.
+
+    With r = `inverse_dynamics`, M dqdd = dtau - dr/dq dq - dr/dqd dqd at the state's own qdd. The derivatives of r are central
+    differences of sixth order with a step of 0.01: r is a sum of sines and polynomials, so they are exact to some 1e-12 of it.
+    An elastic joint has the tangent stiffness under the torque that the state asks of it.
+
+    Raises:
+        InputError: an input is not finite or not (5,).
+    """
+    q, qd, qdd = broadcast(q=q, qd=np.zeros(5) if qd is None else qd, qdd=np.zeros(5) if qdd is None else qdd)
+    if q.shape != (5,):
+        raise InputError(f"a state to linearise at has shape {q.shape}; it must be (5,)")
+    boom, E, m = plant.boom, list(plant.elastic), len(plant.elastic)
+
+    def torque(x: Array) -> Array:
+        return inverse_dynamics(boom, x[..., :5], x[..., 5:], qdd, reactions=False).tau
+
+    by_state = -slopes(torque, np.concatenate([q, qd]))
+    by_state[:, 5:] -= np.diag(boom.friction.viscous)
+    rigid = plant.rotor.copy()
+    rigid[E] = 0.0
+    n = 10 + 2 * m
+    motor, motor_d = 10 + np.arange(m), 10 + m + np.arange(m)
+    forces = np.zeros((5, n))  # of the links' equations, by x
+    forces[:, :10] = by_state
+    inputs = np.eye(5)
+    A, B = np.zeros((n, n)), np.zeros((n, 5))
+    A[:5, 5:10] = np.eye(5)
+    if E:
+        load = (torque(np.concatenate([q, qd])) + boom.friction.viscous * qd)[E]
+        K, c = tangent_stiffness(plant, q, load), plant.damping
+        _, C_4 = compliance(plant, q)
+        C_44 = slopes(lambda x: compliance(plant, _extended(q, x))[1], q[3:4], 1e-3)[:, 0]
+        passed = np.zeros((m, n))  # T_s + c (thetad - qd), by x
+        rows = np.arange(m)
+        passed[rows, motor], passed[rows, E] = K, -K
+        passed[rows, 3] -= K * load * C_4
+        passed[rows, motor_d] = c
+        passed[rows, 5 + np.array(E)] = -c
+        forces[E] += passed
+        spring = passed.copy()
+        spring[:, 5:10], spring[:, motor_d] = 0.0, 0.0
+        forces[3] += (load * C_4) @ spring
+        forces[3, 3] += 0.5 * load**2 @ C_44
+        inputs[E, E] = 0.0
+        A[motor, motor_d] = 1.0
+        A[motor_d] = -passed / plant.rotor[E][:, None]
+        B[motor_d, E] = 1.0 / plant.rotor[E]
+    M = mass_matrix(boom, q) + np.diag(rigid)
+    A[5:10], B[5:10] = np.linalg.solve(M, forces), np.linalg.solve(M, inputs)
+    measured = np.eye(5, n)
+    measured[E] = 0.0
+    measured[E, motor] = 1.0
+    return Linear(A, B, measured)
+
+
+def _extended(q: Array, extension: Array) -> Array:
+    """q with other extensions (..., 1), (..., 5)."""
+    moved = np.broadcast_to(q, (*extension.shape[:-1], 5)).copy()
+    moved[..., 3] = extension[..., 0]
+    return moved

@@ -1,0 +1,305 @@
+"""The boom as its controllers meet it: rigid links, motors behind elastic gearboxes, links that bend, friction.
+
+A joint whose gearbox has a printed stiffness has two coordinates, the motor's theta (at the joint's side of the gears) and
+the link's q:
+
+    M(q) qdd + h(q, qd) + friction(qd) = T_s + c (thetad - qd)             q, with u instead at a joint without elasticity
+    J thetadd + F(thetad, T_s) + T_s + c (thetad - qd) = u                 J = N^2 (J_rotor + J_gear)
+
+T_s(theta - q) is the torque of the gearbox's piecewise stiffness K1, K2, K3 in series with the link's bending as a torsional
+spring. A force F at the end of a cantilever of length L moves it by F L^3 / (3 E I), which is the angle F L^2 / (3 E I) seen
+from its root: the inner link, which pin 8 loads by a force alone, is a spring of 3 E I / L at joint 2. The extension, of which
+L_f = clear + theta4 is outside its housing, lets the wrist go across by F L_f^3 / (3 E I), which at rho = L7 + theta4 from
+pin 8 is a spring of 3 E I rho^2 / L_f^3 at joint 3.
+Bending out of the arm's plane, torsion of the links and the play of their pins are left out.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from boom_model import JOINTS, BaseMotion, Boom, Drive, InputError, gravity_torque, inverse_dynamics, mass_matrix
+from boom_model.arrays import Array, read_only
+from boom_model.drives import available_torque, reflected_inertia
+from planner.control.figures import Figures
+
+_UNITS = np.concatenate([np.zeros((1, 5)), np.eye(5)])
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A boom with its drives' elasticity and friction; m joints are elastic."""
+
+    boom: Boom
+    figures: Figures
+    elastic: tuple[int, ...]
+    """Indices of the elastic joints."""
+    rotor: Array
+    """(5,) N^2 (J_rotor + J_gear) [kg m^2], 0 where no drive gives it."""
+    stiffness: Array
+    """(m, 3) K1, K2, K3 of the gearboxes [Nm/rad]."""
+    breaks: Array
+    """(m, 2) T1, T2 [Nm]."""
+    gap: Array
+    """(m,) backlash [rad], 0 unless asked for."""
+    damping: Array
+    """(m,) c [Nm s/rad]."""
+    coulomb: Array
+    """(m,) N T_noload [Nm]: what turns the gearbox without a load."""
+    loss: Array
+    """(m,) 1 / eta - 1: further friction while driving, as a share of the load."""
+    bends: bool
+    """Whether inner link and extension bend."""
+
+    @staticmethod
+    def of(
+        boom: Boom,
+        figures: Figures | None = None,
+        *,
+        elastic: bool = True,
+        bending: bool = True,
+        backlash: bool = False,
+        reference: Array | None = None,
+    ) -> "Plant":
+        """The plant of a boom.
+
+        Args:
+            figures: what is assumed; None takes every default.
+            elastic: whether gearboxes with a printed stiffness twist; without it the motors' inertia is the joint's.
+            bending: whether inner link and extension bend, each in series with its joint's gearbox.
+            backlash: whether the gearboxes have the play that their sheets print.
+            reference: joint position (5,) at which the lowest mode has the structural damping ratio; None is the middle of
+                the joints' ranges. c = 2 zeta K / omega_1 there (damping in proportion to stiffness).
+        """
+        figures = Figures.of() if figures is None else figures
+        joints = [i for i, drive in enumerate(boom.drives) if elastic and drive is not None and _twists(drive)]
+        gears = [drive.gearbox for i in joints if (drive := boom.drives[i])]
+        share, count = figures.friction_share, len(joints)
+        plant = Plant(
+            boom=boom,
+            figures=figures,
+            elastic=tuple(joints),
+            rotor=read_only([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]),
+            stiffness=read_only(np.reshape([g.torsion_stiffness for g in gears], (count, 3))),
+            breaks=read_only(np.reshape([g.torsion_torques for g in gears], (count, 2))),
+            gap=read_only([(g.backlash or 0.0) if backlash else 0.0 for g in gears]),
+            damping=read_only(np.zeros(count)),
+            coulomb=read_only([share * g.ratio * (g.no_load_input_torque or 0.0) for g in gears]),
+            loss=read_only([share * (1.0 / (g.efficiency or 1.0) - 1.0) for g in gears]),
+            bends=bending,
+        )
+        if not joints:
+            return plant
+        q = (boom.limits.lower + boom.limits.upper) / 2.0 if reference is None else np.asarray(reference, dtype=float)
+        damping = (
+            2.0 * figures.structural_damping / (2.0 * np.pi * natural_frequencies(plant, q)[0]) * tangent_at_rest(plant, q)
+        )
+        return replace(plant, damping=read_only(damping))
+
+    def with_boom(self, boom: Boom) -> "Plant":
+        """The same drives, figures and damping on another boom: another payload, for example."""
+        return replace(self, boom=boom)
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """What is not known of this plant, a sentence each."""
+        driven = [JOINTS[i] for i, drive in enumerate(self.boom.drives) if drive is not None]
+        without = [joint for joint in JOINTS if joint not in driven]
+        sentences = []
+        if without:
+            sentences.append(
+                f"{', '.join(without)}: no drive is given; simulated as a source of any torque without inertia, elasticity and "
+                "friction of its own, so what their drives can bear is NOT CHECKABLE"
+            )
+        rigid = [joint for joint in driven if JOINTS.index(joint) not in self.elastic]
+        if rigid:
+            sentences.append(f"{', '.join(rigid)}: the gearbox does not twist here, and has no friction of its own")
+        return tuple(sentences)
+
+
+def _twists(drive: Drive) -> bool:
+    """Whether the sheets give all that an elastic joint needs."""
+    gear = drive.gearbox
+    return None not in (gear.torsion_stiffness, gear.torsion_torques, reflected_inertia(drive))
+
+
+def compliance(plant: Plant, q: Array) -> tuple[Array, Array]:
+    """Of the links behind each elastic joint [rad/Nm], (..., m), and its derivative by theta4 [rad/(Nm m)]."""
+    C, C_4 = np.zeros((*q.shape[:-1], len(plant.elastic))), np.zeros((*q.shape[:-1], len(plant.elastic)))
+    if plant.bends:
+        for column, joint in enumerate(plant.elastic):
+            if joint == 1:
+                C[..., column] = plant.boom.geometry.L9 / (3.0 * plant.figures.inner_bending)
+            elif joint == 2:
+                free, rho = plant.figures.extension_clear_mm * 1e-3 + q[..., 3], plant.boom.geometry.L7 + q[..., 3]
+                free = np.maximum(free, 0.0)
+                C[..., column] = free**3 / (3.0 * plant.figures.extension_bending * rho**2)
+                C_4[..., column] = C[..., column] * (3.0 / np.maximum(free, 1e-9) - 2.0 / rho)
+    return C, C_4
+
+
+def _segments(plant: Plant, C: Array) -> tuple[tuple[Array, Array, Array], Array, Array]:
+    """Stiffness of each segment in series with compliance C (..., m), and the twists at which they end."""
+    first, second, third = (1.0 / (1.0 / plant.stiffness[:, i] + C) for i in range(3))
+    end_1 = plant.breaks[:, 0] / first
+    return (first, second, third), end_1, end_1 + (plant.breaks[:, 1] - plant.breaks[:, 0]) / second
+
+
+def spring_torque(plant: Plant, q: Array, twist: Array, C: Array | None = None) -> Array:
+    """T_s (..., m) [Nm] at a twist theta - q (..., m) [rad]."""
+    (k1, k2, k3), end_1, end_2 = _segments(plant, compliance(plant, q)[0] if C is None else C)
+    x = np.maximum(np.abs(twist) - 0.5 * plant.gap, 0.0)
+    size = k1 * np.minimum(x, end_1) + k2 * np.clip(x - end_1, 0.0, end_2 - end_1) + k3 * np.maximum(x - end_2, 0.0)
+    torque: Array = np.copysign(size, twist)
+    return torque
+
+
+def twist_under(plant: Plant, q: Array, torque: Array) -> Array:
+    """Twist theta - q (..., m) [rad] under a torque (..., m) [Nm]: the inverse of `spring_torque`."""
+    C, size = compliance(plant, q)[0], np.abs(torque)
+    (k1, k2, k3), _, _ = _segments(plant, C)
+    low, high = plant.breaks[:, 0], plant.breaks[:, 1]
+    x = np.minimum(size, low) / k1 + np.clip(size - low, 0.0, high - low) / k2 + np.maximum(size - high, 0.0) / k3
+    twist: Array = np.copysign(x + 0.5 * plant.gap * (size > 0.0), torque)
+    return twist
+
+
+def spring_energy(plant: Plant, q: Array, twist: Array) -> Array:
+    """Energy (...) [J] in all springs: the integral of T_s over the twist."""
+    (k1, k2, k3), end_1, end_2 = _segments(plant, compliance(plant, q)[0])
+    x = np.maximum(np.abs(twist) - 0.5 * plant.gap, 0.0)
+    a, b, c = np.minimum(x, end_1), np.clip(x - end_1, 0.0, end_2 - end_1), np.maximum(x - end_2, 0.0)
+    low, high = plant.breaks[:, 0], plant.breaks[:, 1]
+    energy: Array = (0.5 * (k1 * a**2 + k2 * b**2 + k3 * c**2) + low * b + high * c).sum(axis=-1)
+    return energy
+
+
+def tangent_stiffness(plant: Plant, q: Array, torque: Array) -> Array:
+    """dT_s/d(twist) (..., m) [Nm/rad] at a torque (..., m)."""
+    (k1, k2, k3), _, _ = _segments(plant, compliance(plant, q)[0])
+    size = np.abs(torque)
+    stiffness: Array = np.where(size < plant.breaks[:, 0], k1, np.where(size < plant.breaks[:, 1], k2, k3))
+    return stiffness
+
+
+def tangent_at_rest(plant: Plant, q: Array) -> Array:
+    """`tangent_stiffness` under the torque that holds the boom still, (..., m)."""
+    return tangent_stiffness(plant, q, gravity_torque(plant.boom, q)[..., list(plant.elastic)])
+
+
+def natural_frequencies(plant: Plant, q: Array, stiffness: Array | None = None) -> Array:
+    """Frequencies (m,) [Hz] with the motors and all rigid joints held, lowest first.
+
+    det(K + dg/dq - omega^2 M) = 0 over the elastic joints, at q (5,).
+
+    Args:
+        stiffness: K (m,) [Nm/rad]; None is the tangent under the torque that holds the boom still.
+
+    Raises:
+        InputError: no joint is elastic.
+    """
+    if not plant.elastic:
+        raise InputError("no joint is elastic: nothing swings")
+    E = list(plant.elastic)
+    K = np.diag(tangent_at_rest(plant, q) if stiffness is None else stiffness) + gravity_stiffness(plant.boom, q)[np.ix_(E, E)]
+    squares = np.linalg.eigvals(np.linalg.solve(mass_matrix(plant.boom, q)[np.ix_(E, E)], K))
+    frequencies: Array = np.sqrt(np.maximum(np.sort(squares.real), 0.0)) / (2.0 * np.pi)
+    return frequencies
+
+
+def gravity_stiffness(boom: Boom, q: Array) -> Array:
+    """dg/dq (5, 5), by the central difference of sixth order: exact to some 1e-12 for this sum of sines."""
+    return slopes(lambda x: gravity_torque(boom, x), q)
+
+
+def slopes(f: Callable[[Array], Array], x: Array, h: float = 1e-2) -> Array:
+    """df/dx (k, n) of f: (..., n) -> (..., k) at x (n,), by the central difference of sixth order, in one call of f."""
+    weights = np.array([3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0]) / h
+    shifts = h * np.arange(1.0, 4.0)[:, None, None] * np.eye(x.size)
+    values = f(np.stack([x + shifts, x - shifts]))
+    slope: Array = np.einsum("s,sik->ki", weights, values[0] - values[1])
+    return slope
+
+
+def friction(plant: Plant, speed: Array, load: Array) -> Array:
+    """F (..., m) [Nm] of the gearboxes at motor speed (..., m) [rad/s, at the joint] under the load T_s (..., m).
+
+        F = tanh(speed / v) (N T_noload + (1 / eta - 1) max(T_s sign(speed), 0))
+
+    as `motor_torque` while driving. While braking the no-load torque alone helps to brake. tanh stands for the sign, so
+    friction creeps below v and does not stick.
+    """
+    direction = np.tanh(speed / np.radians(plant.figures.stick_deg_s))
+    torque: Array = direction * (plant.coulomb + plant.loss * np.maximum(load * np.sign(speed), 0.0))
+    return torque
+
+
+def accelerations(
+    plant: Plant,
+    q: Array,
+    qd: Array,
+    theta: Array,
+    theta_d: Array,
+    u: Array,
+    *,
+    base: BaseMotion | None = None,
+    tip_force: Array | None = None,
+) -> tuple[Array, Array]:
+    """qdd (B, 5) and thetadd (B, m) of B boom states under drive torques u (B, 5), at the joints' side of the gears.
+
+    Args:
+        q, qd: (B, 5); theta, theta_d: (B, m), at the joints' side of the gears.
+        base: the vehicle's motion, each entry (3,).
+        tip_force: (3,) or (B, 3) of the surroundings on the tip [N].
+
+    Raises:
+        InputError: a state is not finite.
+    """
+    boom, E = plant.boom, list(plant.elastic)
+    tau: Array = u.copy()
+    thetadd = np.zeros_like(theta)
+    if E:
+        C, C_4 = compliance(plant, q)
+        load = spring_torque(plant, q, theta - q[:, E], C)
+        passed = load + plant.damping * (theta_d - qd[:, E])
+        tau[:, E] = passed
+        tau[:, 3] += 0.5 * (load**2 * C_4).sum(axis=-1)  # a bent extension pushes itself out: so the energy is kept
+        thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.rotor[E]
+    if boom.friction.viscous.any() or boom.friction.coulomb.any():
+        direction = np.tanh(qd / np.radians(plant.figures.stick_deg_s))
+        tau -= boom.friction.viscous * qd + boom.friction.coulomb * direction
+    # One call for the bias and the five columns of M: a call costs far more than its states do.
+    force = None if tip_force is None else np.broadcast_to(tip_force, (len(q), 3))[:, None]
+    terms = inverse_dynamics(
+        boom, q[:, None], qd[:, None], np.broadcast_to(_UNITS, (len(q), 6, 5)), base=base, tip_force=force, reactions=False
+    ).tau
+    bias, M = terms[:, 0], terms[:, 1:] - terms[:, :1]
+    rigid = plant.rotor.copy()
+    rigid[E] = 0.0
+    qdd = np.linalg.solve(M + np.diag(rigid), (tau - bias)[..., None])[..., 0]
+    return np.asarray(qdd), thetadd
+
+
+def equilibrium(plant: Plant, theta: Array, base: BaseMotion | None = None) -> Array:
+    """Joint position q (B, 5) at which the boom hangs still from motors at theta (B, 5): q = theta - twist(g(q))."""
+    q, E = theta.copy(), list(plant.elastic)
+    if E:
+        for _ in range(20):  # a contraction by g' / K, some 1e-3
+            q[:, E] = theta[:, E] - twist_under(plant, q, gravity_torque(plant.boom, q, base=base)[:, E])
+    return q
+
+
+def torque_limits(plant: Plant, speed: Array) -> Array:
+    """N T_available(N speed) (..., 5) [Nm] at motor speed (..., 5) [rad/s, at the joint]; infinite where it is not known."""
+    limits = np.full(speed.shape, np.inf)
+    for i, drive in enumerate(plant.boom.drives):
+        if drive is None:
+            continue
+        available = available_torque(drive, drive.gearbox.ratio * speed[..., i])
+        running = drive.motor.running_torque
+        if available is not None:
+            limits[..., i] = drive.gearbox.ratio * available
+        elif running is not None:
+            limits[..., i] = drive.gearbox.ratio * running
+    return limits

@@ -1,0 +1,445 @@
+"""How well a boom follows its plan: every move, controller and shaper side by side, measured and reported."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+
+from boom_model import JOINTS, Boom, forward_kinematics
+from boom_model.arrays import Array
+from boom_model.errors import InputError
+from planner.control.closed_loop import Case, Command, Gust, Run, simulate
+from planner.control.design import Controller, Goals, Loop, analyse
+from planner.control.figures import Figures
+from planner.control.plant import Plant, natural_frequencies
+from planner.control.shaping import Impulses, Shaper, impulses
+from planner.planning import Move
+from planner.report import assumptions
+from planner.vehicle import VehicleCase
+
+POSES = 9
+"""Poses along a move at which the loop's poles are computed."""
+
+
+class Outcome(StrEnum):
+    """What became of a case."""
+
+    FOLLOWS = "follows"
+    SATURATES = "saturates"
+    UNSTABLE = "UNSTABLE"
+    LOST_STEP = "LOST STEP"
+
+
+FAILED = (Outcome.UNSTABLE, Outcome.LOST_STEP)
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What is simulated beside the moves themselves."""
+
+    goals: Goals = field(default_factory=Goals)
+    figures: Figures = field(default_factory=Figures)
+    elastic: bool = True
+    bending: bool = True
+    backlash: bool = False
+    compensate_sag: bool = False
+    payload_error: float = 0.0
+    """True payload less the one that plan and controllers believe in [kg]."""
+    vehicle: VehicleCase | None = None
+    gust: Gust | None = None
+    hold: float = 2.0
+    """Simulated after the end of the longest command [s]."""
+    settled: float = 1e-3
+    """Distance of the tip [m] within which it counts as settled."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """How one controller followed one command, in SI. Figures that a diverged case does not have are None."""
+
+    profile: str
+    controller: str
+    shaper: str
+    duration_s: float
+    """Of the command, the shaper's delay included."""
+    outcome: Outcome
+    reason: str
+    """Why the outcome is not FOLLOWS; empty otherwise."""
+    tip_error_peak_m: float | None
+    """Largest distance of the tip from where the command wants it, until the end of the simulation."""
+    tip_error_rms_m: float | None
+    """Until the end of the command."""
+    tip_error_end_m: float | None
+    """At the end of the simulation: the sag of an elastic boom, above all."""
+    joint_error_peak: tuple[float, ...] | None
+    joint_error_rms: tuple[float, ...] | None
+    overshoot: float | None
+    """Largest of all joints that move, beyond where it comes to rest, as a share of its way."""
+    settling_s: float | None
+    """From the command's end until the tip stays within `settled` of where it comes to rest; None if it does not."""
+    residual_vibration_m: float | None
+    """Largest departure of the tip, after the command's end, from its mean over one period of the lowest mode."""
+    peak_torque_ratio: float | None
+    """Largest |torque asked| / torque that the motor has at its speed, of the joints where that is known."""
+    saturated_share: float
+    """Share of the samples, until a case diverged, at which some motor was asked for more than it has."""
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """A controller's loop at the goal, and its poles along the move."""
+
+    controller: Controller
+    loop: Loop
+    largest_pole: float
+    """Size of the largest sampled pole at POSES poses of the first move."""
+
+    @property
+    def stable(self) -> bool:
+        return self.loop.stable and self.largest_pole <= 1.0 + 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What was simulated, and what came of it."""
+
+    boom: Boom
+    setup: Setup
+    rows: tuple[Row, ...]
+    designs: tuple[Design, ...]
+    modes_Hz: tuple[float, ...]
+    """Natural frequencies at the goal with the motors held, at the stiffness under the boom's weight."""
+    gearbox_Hz: tuple[float, ...]
+    """Likewise of rigid links on gearboxes of stiffness K1, the hand estimate."""
+    impulses: tuple[Impulses, ...]
+    """Of each shaper."""
+    run: Run
+    tip_error: Array
+    """(n, B) [m]"""
+    notes: tuple[str, ...]
+    assumptions: tuple[str, ...]
+
+    @property
+    def failed(self) -> bool:
+        return any(row.outcome in FAILED for row in self.rows)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What became of the cases that do not follow their command, a sentence each."""
+        return tuple(f"{row.profile}, {row.controller}, shaper {row.shaper}: {row.reason}" for row in self.rows if row.reason)
+
+    @property
+    def summary(self) -> str:
+        """How many cases came to what."""
+        counts = {o: sum(row.outcome is o for row in self.rows) for o in Outcome}
+        return "; ".join(f"{count} of {len(self.rows)} cases: {outcome}" for outcome, count in counts.items() if count)
+
+    def to_json(self, files: dict[str, str]) -> dict[str, Any]:
+        """The JSON object of `boom control`, in SI."""
+        return {
+            "ok": not self.failed,
+            "cases": [asdict(row) for row in self.rows],
+            "modes_Hz": list(self.modes_Hz),
+            "gearbox_alone_Hz": list(self.gearbox_Hz),
+            "designs": [
+                {
+                    "controller": design.controller,
+                    "stable": design.stable,
+                    "largest_sampled_pole": design.largest_pole,
+                    "margins": [{**asdict(m), "joint": JOINTS[m.joint]} for m in design.loop.margins],
+                    "poles_1_s": [[float(p.real), float(p.imag)] for p in design.loop.poles],
+                }
+                for design in self.designs
+            ],
+            "notes": list(self.notes),
+            "assumptions": list(self.assumptions),
+            "files": files,
+        }
+
+    def to_markdown(self) -> str:
+        """The report as Markdown, in people's units."""
+        lines = [f"# {self.summary}", "", self.modes_sentence, ""]
+        lines += [*_markdown(ROW_HEADER, [row_cells(row) for row in self.rows]), "", ROW_LEGEND]
+        if self.designs:
+            lines += ["", "## Loops at the goal, each joint's broken with the others closed", ""]
+            lines += _markdown(LOOP_HEADER, [cells for design in self.designs for cells in loop_cells(design)])
+        for title, texts in (("Cases", self.reasons), ("Notes", self.notes), ("Assumed", self.assumptions)):
+            if texts:
+                lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
+        return "\n".join(lines) + "\n"
+
+    @property
+    def modes_sentence(self) -> str:
+        """The natural frequencies for people."""
+        if not self.modes_Hz:
+            return "No joint is elastic: nothing swings"
+        shown, gears = (", ".join(f"{f:.2f}" for f in each) for each in (self.modes_Hz, self.gearbox_Hz))
+        return f"Natural frequencies at the goal, motors held: {shown} Hz (rigid links, gearboxes of stiffness K1: {gears} Hz)"
+
+
+def study(
+    boom: Boom, moves: Sequence[Move], controllers: Sequence[Controller], shapers: Sequence[Shaper], setup: Setup | None = None
+) -> Study:
+    """Follows every move with every controller and shaper, and measures what comes of it.
+
+    The shapers are made for the lowest mode at the first move's goal, motors held, with the structural damping ratio.
+
+    Raises:
+        InputError: nothing to simulate, a payload below 0, or a shaper for a plant in which no joint is elastic.
+    """
+    setup = Setup() if setup is None else setup
+    if not (moves and controllers and shapers):
+        raise InputError("a study needs at least one move, one controller and one shaper")
+    goal = moves[0].trajectory.q[-1]
+    model = Plant.of(boom, setup.figures, elastic=setup.elastic, bending=setup.bending, backlash=setup.backlash, reference=goal)
+    true = boom.with_payload(boom.payload.mass + setup.payload_error)
+    plant = model.with_boom(true)
+    modes, gearbox = _modes(plant, goal)
+    if not modes and set(shapers) != {Shaper.NONE}:
+        raise InputError("no joint is elastic: there is no mode to shape a command for")
+    shaped = {s: impulses(s, _modes(model, goal)[0][0] if modes else 1.0, setup.figures.structural_damping) for s in shapers}
+    cases, names = [], []
+    for move in moves:
+        for shaper in shapers:
+            command = Command.of(move, shaped[shaper])
+            for controller in controllers:
+                cases.append(Case.of(model, controller, setup.goals, command))
+                names.append((str(move.profile), str(controller), str(shaper)))
+    designs = [_design(plant, model, case) for case in cases[: len(controllers)] if case.controller is not Controller.STEPPER]
+    hold = max(case.command.duration for case in cases) + setup.hold
+    run = simulate(
+        plant,
+        cases,
+        hold,
+        model=boom,
+        vehicle=setup.vehicle,
+        gust=setup.gust,
+        compensate_sag=setup.compensate_sag,
+    )
+    off = forward_kinematics(boom, run.q).position - forward_kinematics(boom, run.command).position
+    tip_error = np.linalg.norm(off, axis=-1)
+    stable = {design.controller: design for design in designs}
+    period = 1.0 / modes[0] if modes else None
+    rows = tuple(
+        _row(name, case, run, b, tip_error[:, b], off[:, b], period, stable.get(case.controller), setup)
+        for b, (name, case) in enumerate(zip(names, cases, strict=True))
+    )
+    return Study(
+        boom=true,
+        setup=setup,
+        rows=rows,
+        designs=tuple(designs),
+        modes_Hz=modes,
+        gearbox_Hz=gearbox,
+        impulses=tuple(shaped.values()),
+        run=run,
+        tip_error=tip_error,
+        notes=_notes(plant, setup, controllers),
+        assumptions=(*setup.figures.assumptions, *assumptions(boom, any(m.trajectory.qddd is not None for m in moves))),
+    )
+
+
+def _modes(plant: Plant, goal: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    if not plant.elastic:
+        return (), ()
+    rigid = replace(plant, bends=False)
+    return tuple(map(float, natural_frequencies(plant, goal))), tuple(
+        map(float, natural_frequencies(rigid, goal, plant.stiffness[:, 0]))
+    )
+
+
+def _design(plant: Plant, model: Plant, case: Case) -> Design:
+    times = np.linspace(0.0, case.command.duration, POSES)
+    along = [
+        analyse(plant, case.gains_at(t), q, model=model, responses=False).largest
+        for t, q in zip(times, case.command(times)[0], strict=True)
+    ]
+    loop = analyse(plant, case.gains[-1], case.gains[-1].at, model=model)
+    return Design(case.controller, loop, max(along))
+
+
+def _row(
+    name: tuple[str, str, str],
+    case: Case,
+    run: Run,
+    b: int,
+    tip_error: Array,
+    off: Array,
+    period: float | None,
+    design: Design | None,
+    setup: Setup,
+) -> Row:
+    end, T = case.command.duration, float(run.t[1])
+    error = run.q[:, b] - run.command[:, b]
+    asked = np.abs(run.torque[:, b]) / run.limit[:, b]
+    over = np.any(asked > 1.0, axis=1)
+    lasted = run.t < (np.inf if np.isnan(run.ended[b]) else run.ended[b])
+    saturated = 0.0 if case.controller is Controller.STEPPER else float(over[lasted].mean())
+    outcome, reason = _outcome(run, b, design, saturated)
+    during, after = run.t <= end + T / 2.0, run.t >= end - T / 2.0
+    sound = bool(np.isnan(run.ended[b]))
+    last = max(int(np.ceil((period or 0.25) / T)), 1)
+    rest = off[-last:].mean(axis=0)
+    away = np.linalg.norm(off[after] - rest, axis=-1) > setup.settled
+    settling = None
+    if not away[-1]:
+        settling = float(T * (np.flatnonzero(away)[-1] + 1)) if away.any() else 0.0
+    return Row(
+        *name,
+        duration_s=end,
+        outcome=outcome,
+        reason=reason,
+        tip_error_peak_m=float(tip_error.max()) if sound else None,
+        tip_error_rms_m=float(np.sqrt(np.mean(tip_error[during] ** 2))) if sound else None,
+        tip_error_end_m=float(np.linalg.norm(rest)) if sound else None,
+        joint_error_peak=tuple(np.abs(error).max(axis=0).tolist()) if sound else None,
+        joint_error_rms=tuple(np.sqrt(np.mean(error[during] ** 2, axis=0)).tolist()) if sound else None,
+        overshoot=_overshoot(run.q[:, b], run.command[:, b], last) if sound else None,
+        settling_s=settling if sound else None,
+        residual_vibration_m=_residual(off[after], last) if sound and period is not None else None,
+        peak_torque_ratio=float(asked.max()) if sound and np.isfinite(run.limit[:, b]).any() else None,
+        saturated_share=saturated,
+    )
+
+
+def _outcome(run: Run, b: int, design: Design | None, saturated: float) -> tuple[Outcome, str]:
+    lost = run.lost[b]
+    if not np.isnan(lost).all():
+        i = int(np.nanargmin(lost))
+        return Outcome.LOST_STEP, f"{JOINTS[i]}'s motor loses its first step at {lost[i]:.3f} s"
+    if not np.isnan(run.ended[b]):
+        said = f"out of control at {run.ended[b]:.3f} s"
+        return Outcome.UNSTABLE, said + (f", with its motors saturated {saturated:.1%} of the time" if saturated else "")
+    if design is not None and not design.stable:
+        return Outcome.UNSTABLE, f"a sampled pole of size {max(design.largest_pole, design.loop.largest):.6f} on the way"
+    if saturated > 0.0:
+        i = int((np.abs(run.torque[:, b]) / run.limit[:, b]).max(axis=0).argmax())
+        return Outcome.SATURATES, f"{JOINTS[i]}'s motor is asked for more than it has; saturated {saturated:.1%} of the time"
+    return Outcome.FOLLOWS, ""
+
+
+def _overshoot(q: Array, command: Array, last: int) -> float:
+    way = command[-1] - command[0]
+    moves = np.abs(way) > 1e-6
+    if not moves.any():
+        return 0.0
+    beyond = (q - q[-last:].mean(axis=0))[:, moves] / way[moves]
+    return float(max(beyond.max(), 0.0))
+
+
+def _residual(off: Array, window: int) -> float:
+    """Largest |off - moving mean of off over one period| (n, 3): slow creep has no part in it."""
+    if len(off) <= window:
+        return 0.0
+    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(off, axis=0)])
+    means = (sums[window:] - sums[:-window]) / window
+    middle = off[window // 2 : window // 2 + len(means)]
+    return float(np.linalg.norm(middle - means, axis=-1).max())
+
+
+def _notes(plant: Plant, setup: Setup, controllers: Sequence[Controller]) -> tuple[str, ...]:
+    notes = [*plant.limits]
+    given = [f"{name} {getattr(setup.figures, name):g}" for name in setup.figures.given]
+    if given:
+        notes.append(f"given: {', '.join(given)}")
+    if plant.bends and plant.elastic:
+        notes.append(
+            "inner link and extension bend in the arm's plane, as torsional springs behind the gearboxes; sideways bending, "
+            "the other links and the pins are rigid"
+        )
+    if plant.elastic and not plant.gap.any():
+        notes.append("backlash and hysteresis of the gearboxes are left out")
+    elif plant.elastic:
+        notes.append("hysteresis of the gearboxes is left out")
+    if setup.payload_error:
+        believed = plant.boom.payload.mass - setup.payload_error
+        notes.append(f"the true payload is {plant.boom.payload.mass:g} kg; plan and controllers believe in {believed:g} kg")
+    if setup.vehicle is not None:
+        notes.append(f"{setup.vehicle.sentence}; the controllers know its slope alone")
+    if setup.gust is not None:
+        gust = setup.gust
+        notes.append(f"gust on the tip: {gust.force} N at most, from {gust.start:g} s for {gust.duration:g} s (assumed)")
+    goals = setup.goals
+    if set(controllers) != {Controller.STEPPER}:
+        notes.append(
+            f"loops designed for poles at {goals.bandwidth_Hz:g} Hz with damping {goals.damping:g}, "
+            f"integral action at {goals.integral:g} of that"
+        )
+    if setup.compensate_sag:
+        notes.append("the motors are sent ahead by the twist that the believed weight gives")
+    if Controller.STEPPER in controllers:
+        notes.append(
+            "stepper: open loop, so it has no margins; the joints without a drive follow by pd with full feedforward meanwhile"
+        )
+    return tuple(notes)
+
+
+ROW_HEADER = (
+    "profile",
+    "controller",
+    "shaper",
+    "time s",
+    "tip mm",
+    "rms mm",
+    "rest mm",
+    "shakes mm",
+    "over",
+    "settles s",
+    "torque",
+    "outcome",
+)
+
+LOOP_HEADER = ("controller", "joint", "gain margin dB", "less gain dB", "phase margin deg", "at Hz", "max |S|")
+
+
+ROW_LEGEND = (
+    "tip: its largest error, RMS until the command ends, and what stays at rest (sag); shakes: residual vibration after the "
+    "command's end; over: overshoot of a joint; settles: after that end; torque: largest share of what the motor "
+    "has at its speed, where that is known"
+)
+
+
+def row_cells(row: Row) -> tuple[str, ...]:
+    """A case for people, under ROW_HEADER."""
+    millimetres = (row.tip_error_peak_m, row.tip_error_rms_m, row.tip_error_end_m, row.residual_vibration_m)
+    return (
+        row.profile,
+        row.controller,
+        row.shaper,
+        f"{row.duration_s:.2f}",
+        *("-" if value is None else f"{1e3 * value:.2f}" for value in millimetres),
+        "-" if row.overshoot is None else f"{row.overshoot:.2%}",
+        "-" if row.settling_s is None else f"{row.settling_s:.2f}",
+        "-" if row.peak_torque_ratio is None else f"{row.peak_torque_ratio:.2f}",
+        str(row.outcome),
+    )
+
+
+def loop_cells(design: Design) -> list[tuple[str, ...]]:
+    """A controller's loops for people, under LOOP_HEADER."""
+
+    def shown(value: float | None, digits: int = 1) -> str:
+        return "-" if value is None else f"{value:.{digits}f}"
+
+    return [
+        (
+            design.controller,
+            JOINTS[m.joint],
+            shown(m.gain_dB),
+            shown(m.less_gain_dB),
+            shown(m.phase_deg),
+            shown(m.crossover_Hz, 2),
+            shown(m.sensitivity_peak, 2),
+        )
+        for m in design.loop.margins
+    ]
+
+
+def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    return [
+        "| " + " | ".join(header) + " |",
+        "|" + " --- |" * len(header),
+        *("| " + " | ".join(row) + " |" for row in rows),
+    ]

@@ -1,0 +1,90 @@
+"""A link's design as a picture: contour, stress, convergence, original against designed."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from boom_model.arrays import Array
+from boom_model.link_design import internal_forces, von_mises
+from planner.files import replacing
+from planner.link_report import title
+from planner.links import LinkDesign
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+from planner.link_convergence import PLACES, study
+
+_BLUE, _ORANGE, _GREEN, _PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
+
+
+def write_link_picture(path: str | Path, design: LinkDesign) -> None:
+    """Writes a PNG of eight plots: contours, stress along the link, convergences, the joint's torque, and mass.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14.0, 17.0), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    ((contour, stress), (slices, steps), (elements, places), (torque, bars)) = figure.subplots(4, 2)
+    figure.suptitle(title(design), fontsize=11)
+    x = design.beam.stations
+    for H, name, color in ((design.heights, "design", _BLUE), (design.stress_heights, "stress only", _ORANGE)):
+        contour.fill_between(x, 500.0 * H, -500.0 * H, color=color, alpha=0.35 if name == "design" else 0.6, label=name)
+    contour.plot([0.0, design.link.length], [0.0, 0.0], "ko", markersize=4, label="pins")
+    contour.set(title="Contour of the plates (height not to scale)", xlabel="x from the root [m]", ylabel="y [mm]")
+    only = von_mises(design.beam, design.stress_heights, internal_forces(design.beam, design.stress_heights, design.cases))
+    stress.plot(x, 1e-6 * design.stress, color=_BLUE, label="design")
+    stress.plot(x, 1e-6 * only.max(axis=0), color=_ORANGE, linewidth=1.0, label="stress only")
+    stress.axhline(1e-6 * design.limits.stress, color="black", linestyle="--", linewidth=1.0, label="limit")
+    stress.set(title="Largest von Mises stress", xlabel="x from the root [m]", ylabel="[MPa]", ylim=(0.0, None))
+    found = study(design)
+    slices.plot(found.slices[:, 0], found.slices[:, 1], marker="o", color=_BLUE, label="plates")
+    slices.set(title="Mass by number of slices", xlabel="slices", ylabel="[kg]")
+    steps.set(title="Mass by delta-H of the thesis's method", xlabel="delta-H [m]", ylabel="[kg]")
+    if found.steps is None or found.stepless is None:
+        _say(steps, "not run: single instants load the link")
+    else:
+        steps.semilogx(found.steps[:, 0], found.steps[:, 1], marker="o", color=_ORANGE, label="thesis's method")
+        steps.axhline(found.stepless, color=_BLUE, label="exact, at its constraints")
+    for (name, curve), color in zip(found.deflections.items(), (_PURPLE, _BLUE, _GREEN, _ORANGE), strict=False):
+        elements.semilogx(curve[:, 0], 1e3 * curve[:, 1], marker=".", color=color, label=name)
+    elements.axhline(1e3 * design.limits.deflection, color="black", linestyle="--", linewidth=1.0, label="limit")
+    elements.set(title="Deflection by finite elements", xlabel="elements", ylabel="[mm]")
+    places.set(title="Stress at places, beam elements of one height each", xlabel="elements", ylabel="[MPa]")
+    if found.stresses is None:
+        for axes in (elements, places):
+            _say(axes, "not modelled: the link telescopes")
+    else:
+        for place, curve in zip(PLACES, found.stresses.T[1:], strict=True):
+            places.semilogx(found.stresses[:, 0], 1e-6 * curve, marker=".", label=f"x = {place * design.link.length:.3g} m")
+    t = np.concatenate([each.t for each in design.trajectories])
+    for values, name, color in zip(design.torques, ("original link", "designed link"), (_ORANGE, _BLUE), strict=True):
+        torque.plot(*_broken_between_moves(design, t, values), color=color, label=name)
+    torque.set(title="Torque of the link's joint along the moves", xlabel="t [s]", ylabel="[Nm]")
+    masses = [design.before.bodies[design.link.name].mass, design.body.mass]
+    fittings = 0.0 if design.link.fittings is None else design.link.fittings.mass
+    bars.bar(["original", "designed"], masses, color=[_ORANGE, _BLUE], width=0.5)
+    bars.bar(["designed"], [fittings], color="grey", width=0.5, label="of which fittings (kept)")
+    for i, value in enumerate(masses):
+        bars.text(i, value, f"{value:.2f} kg", ha="center", va="bottom")
+    bars.set(title="Mass of the whole link", ylabel="[kg]", ylim=(0.0, 1.15 * max(masses)))
+    for axes in (contour, stress, slices, steps, elements, places, torque, bars):
+        axes.grid(alpha=0.25)
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(fontsize=8)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def _say(axes: "Axes", text: str) -> None:
+    axes.text(0.5, 0.5, text, ha="center", transform=axes.transAxes)
+
+
+def _broken_between_moves(design: LinkDesign, t: Array, values: Array) -> tuple[Array, Array]:
+    """With a gap between one motion and the next."""
+    ends = np.cumsum([each.t.size for each in design.trajectories])[:-1]
+    return np.insert(t, ends, np.nan), np.insert(values, ends, np.nan)

@@ -1,0 +1,436 @@
+"""A link's design as a job: loads from moves, the method, its verification, and the boom with the new link in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TypeVar
+
+import numpy as np
+
+from boom_model import JOINTS, Body, Boom, InputError, inverse_dynamics, transmission_angle
+from boom_model.arrays import Array, read_only
+from boom_model.catalogue import Catalogue
+from boom_model.drives import Drive
+from boom_model.dynamics import PayloadAs
+from boom_model.link_design import (
+    THESIS_LOAD,
+    Beam,
+    Design,
+    Limits,
+    Link,
+    LoadCases,
+    Material,
+    deflection,
+    euler_load,
+    internal_forces,
+    least_mass,
+    link_body,
+    load_link,
+    mass,
+    thesis_design,
+    von_mises,
+    with_body,
+)
+from boom_model.link_design.exact import buckling_load, pressed
+from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
+from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
+from planner.link_loads import largest_components, link_cases, thesis_load
+from planner.planning import check, plan, plan_each_profile
+from planner.rows import Verdict
+from planner.trajectory import Trajectory
+
+E = TypeVar("E", bound=StrEnum)
+
+DRIVEN_BY = {"inner": 1, "lower": 2, "outer": 1, "extension": 2}
+"""The joint whose torque a link's mass weighs on most."""
+
+
+class LoadFrom(StrEnum):
+    """Where a link's loads come from."""
+
+    THESIS = "thesis"
+    MOVES = "moves"
+
+
+class Method(StrEnum):
+    """How its heights are found."""
+
+    THESIS = "thesis"
+    EXACT = "exact"
+
+
+@dataclass(frozen=True)
+class LinkTask:
+    """What is asked of a link."""
+
+    link: str = "inner"
+    load: str = LoadFrom.MOVES
+    method: str = Method.EXACT
+    material: str = "steel"
+    safety_factor: float = 2.0
+    """Yield stress over the stress limit, and buckling load over the largest end load"""
+    deflection: float = 0.01
+    """[m]"""
+    slices: int = 1000
+    step: float = 1e-4
+    """delta-H of the thesis's method [m]"""
+    min_height: float = 0.0
+    max_height: float | None = None
+    max_taper: float | None = None
+    thickness: float | None = None
+    """Of one plate [m]; None is the link's own"""
+    own_mass: bool = True
+    """See `least_mass`"""
+    shear: bool | None = None
+    """Whether shear counts in the deflection of the exact method; None is for the loads of moves, not for the thesis's"""
+    buckling: bool = True
+    """Whether the exact method holds the safety factor against buckling"""
+    largest_components: bool = False
+    """Take each component's largest at once, and not every instant"""
+    payload_as: PayloadAs = "mass"
+    links: str | None = None
+    """The TOML file of plates and fittings; None is the shipped one"""
+
+
+@dataclass(frozen=True)
+class Check:
+    """A figure of the design by an independent model."""
+
+    model: str
+    elements: int
+    deflection: float
+    """[m]"""
+    stress: float
+    """Largest von Mises stress between a tenth and nine tenths of the length [Pa]"""
+
+
+@dataclass(frozen=True)
+class MotorChoice:
+    """A catalogue motor at a link's joint, with the old link and the new."""
+
+    motor: str
+    mass: float | None
+    before: Verdict
+    after: Verdict
+    margin_before: float | None
+    """The least of the motor's rows"""
+    margin_after: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class LinkDesign:
+    """A designed link and what it changes."""
+
+    task: LinkTask
+    link: Link
+    beam: Beam
+    limits: Limits
+    cases: LoadCases
+    thesis_load: ThesisLoad | None
+    """The load as the thesis's method takes it; None where only single instants load the link"""
+    equal_constraints: tuple[float, float] | None
+    """Masses of the plates by the thesis's method and the exact one under the same constraints, the thesis's [kg]"""
+    instants: Array | None
+    """(k, 2) motion and time [s] of each case; None for a load that is no instant"""
+    heights: Array
+    """(n + 1,) [m]"""
+    stress_heights: Array
+    mass: float
+    """Of the plates from pin to pin [kg]"""
+    stress_mass: float
+    deflection: float
+    """[m], by the method's own formula and forces"""
+    stress_deflection: float
+    max_stress: float
+    buckling_load: float
+    """[N]: by the thesis's formula for its method, by the tapered column's eigenvalue for the exact one"""
+    tapered_load: float
+    """[N], the eigenvalue"""
+    pressed: float
+    """Largest end load along the link [N]"""
+    exact: Design | None
+    thesis: ThesisDesign | None
+    own_deflection: float
+    """[m] with the final beam's own mass and shear, whatever the method left out"""
+    stress: Array
+    """(n + 1,) largest von Mises stress along the link with its own mass [Pa]"""
+    worst: int
+    """The load case of the largest deflection"""
+    checks: tuple[Check, ...]
+    body: Body
+    """The whole link: designed plates, cross plates, fittings"""
+    before: Boom
+    after: Boom
+    trajectories: tuple[Trajectory, ...]
+    torques: tuple[Array, Array]
+    """Of the link's joint along all motions, with the old link and the new (samples,) [Nm]"""
+    motors: tuple[MotorChoice, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def joint(self) -> int:
+        return DRIVEN_BY[self.link.name]
+
+    @property
+    def saved(self) -> tuple[float, float]:
+        """Least and largest share of the joint's torque saved, where it is at least a tenth of its peak."""
+        before, after = self.torques
+        counts = np.abs(before) >= 0.1 * np.abs(before).max()
+        share = 1.0 - after[counts] / before[counts]
+        return float(share.min()), float(share.max())
+
+
+def design_link(boom: Boom, task: LinkTask, trajectories: Sequence[Trajectory]) -> LinkDesign:
+    """The link that a task asks for, checked by finite elements, and back in the boom.
+
+    Args:
+        trajectories: the moves that load the link, and along which its joint's torque is compared.
+
+    Raises:
+        InputError: an input is malformed, not finite or out of its range.
+        InfeasibleError: no heights keep the limits.
+    """
+    load, method = _one_of("load", task.load, LoadFrom), _one_of("method", task.method, Method)
+    if not (np.isfinite(task.safety_factor) and task.safety_factor > 0.0):
+        raise InputError(f"safety factor is {task.safety_factor:g}; it must be finite and above 0")
+    link = load_link(boom, task.link, task.links)
+    if task.thickness is not None:
+        link = replace(link, width=task.thickness * link.plates)
+    material = Material.load(task.material)
+    beam = link.beam(material, task.slices)
+    limits = Limits(
+        stress=material.yield_stress / task.safety_factor,
+        deflection=task.deflection,
+        min_height=task.min_height,
+        max_height=task.max_height,
+        max_taper=task.max_taper,
+        buckling_factor=task.safety_factor if task.buckling else None,
+    )
+    instants, old_load = None, None
+    if load is LoadFrom.THESIS:
+        if link.name != "inner":
+            raise InputError(f"the thesis's load is of the inner link, not of the {link.name} one; take the loads of moves")
+        cases, old_load = THESIS_LOAD.cases, THESIS_LOAD
+    elif method is Method.THESIS:
+        old_load = thesis_load(boom, link, trajectories, payload_as=task.payload_as)
+        cases = old_load.cases
+    else:
+        cases, instants = link_cases(boom, link, trajectories, payload_as=task.payload_as)
+        if task.largest_components:
+            cases, instants = largest_components(cases), None
+    exact, old = None, None
+    if method is Method.THESIS and old_load is not None:
+        old = by_thesis(beam, old_load, limits, task)
+        heights, stress_heights = old.heights, old.stress_heights
+    else:
+        exact = least_mass(beam, cases, limits, own_mass=task.own_mass, shear=with_shear(task))
+        heights, stress_heights = exact.heights, exact.stress_heights
+    forces = internal_forces(beam, heights, cases)
+    bent = deflection(beam, heights, forces, shear=True)
+    worst, stress = int(bent.argmax()), von_mises(beam, heights, forces).max(axis=0)
+    tapered = buckling_load(beam, heights, cases)
+    body = link_body(link, beam, heights)
+    after = with_body(boom, link.name, body)
+    torques = tuple(_torque(b, trajectories, DRIVEN_BY[link.name], task.payload_as) for b in (boom, after))
+    return LinkDesign(
+        task=task,
+        link=link,
+        beam=beam,
+        limits=limits,
+        cases=cases,
+        thesis_load=old_load,
+        equal_constraints=_equals(beam, cases, limits, task, old_load),
+        instants=instants,
+        heights=heights,
+        stress_heights=stress_heights,
+        mass=old.mass if old is not None else mass(beam, heights),
+        stress_mass=old.stress_mass if old is not None else mass(beam, stress_heights),
+        deflection=_first(old, exact).deflection,
+        stress_deflection=_first(old, exact).stress_deflection,
+        max_stress=float(stress.max()),
+        buckling_load=tapered if old is None else thesis_buckling(link, beam, heights),
+        tapered_load=tapered,
+        pressed=pressed(cases),
+        exact=exact,
+        thesis=old,
+        own_deflection=float(bent[worst]),
+        stress=read_only(stress),
+        worst=worst,
+        checks=tuple(_checks(beam, heights, cases.at([worst]))),
+        body=body,
+        before=boom,
+        after=after,
+        trajectories=tuple(trajectories),
+        torques=(torques[0], torques[1]),
+        motors=tuple(_motors(boom, after, DRIVEN_BY[link.name], trajectories, task.payload_as)),
+        notes=tuple(_notes(boom, task, link, beam, cases, trajectories, tapered, float(bent[worst]), old)),
+    )
+
+
+def default_moves(boom: Boom, task: LinkTask) -> list[Trajectory]:
+    """Transport to phenotyping: with every profile in its least time, or the thesis's cubic of 5 s where its load is taken.
+
+    Raises:
+        InputError, InfeasibleError: as `plan`.
+    """
+    if task.load == LoadFrom.THESIS:
+        return [plan(boom, "transport", "phenotyping", duration=5.0).trajectory]
+    return plan_each_profile(boom, "transport", "phenotyping")
+
+
+def thesis_buckling(link: Link, beam: Beam, heights: Array) -> float:
+    """Eq. 3.38 [N] for the designed part's smallest section, one solid rounded down to whole centimetres as in the thesis."""
+    first, last = (round(share * beam.slices) for share in link.designed)
+    smallest = float(heights[first : last + 1].min())
+    rounded = np.floor(smallest * 100.0 + 1e-9) / 100.0 or smallest
+    narrow, wide = sorted((rounded, beam.width))
+    return euler_load(beam.material.elastic_modulus, wide * narrow**3 / 12.0, beam.length)
+
+
+def by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: LinkTask) -> ThesisDesign:
+    """The thesis's design for a task.
+
+    Raises:
+        InputError: a limit is given that its method does not know.
+    """
+    asked = {"minimum height": limits.min_height > 0.0, "maximum height": limits.max_height, "maximum taper": limits.max_taper}
+    for name, given in asked.items():
+        if given:
+            raise InputError(f"the thesis's method knows no {name}; the exact method does")
+    return thesis_design(beam, load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=task.step)
+
+
+def with_shear(task: LinkTask) -> bool:
+    """Whether shear counts in the deflection of a task's exact design."""
+    return task.load == LoadFrom.MOVES if task.shear is None else task.shear
+
+
+def _equals(
+    beam: Beam, cases: LoadCases, limits: Limits, task: LinkTask, old_load: ThesisLoad | None
+) -> tuple[float, float] | None:
+    """Masses [kg] of the thesis's method and of the exact one under the thesis's own constraints; None without such a load.
+
+    Both hold the stress, and the deflection with the moments of the stress-only beam; the exact heights are stepless.
+    """
+    if old_load is None:
+        return None
+    plain = Limits(stress=limits.stress, deflection=limits.deflection)
+    theirs = thesis_design(beam, old_load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=task.step)
+    return theirs.mass, least_mass(beam, cases, plain, own_mass=False).mass
+
+
+def _first(old: ThesisDesign | None, exact: Design | None) -> ThesisDesign | Design:
+    found = exact if old is None else old
+    if found is None:
+        raise RuntimeError("one of the methods ran")
+    return found
+
+
+def _one_of(name: str, value: str, known: type[E]) -> E:
+    try:
+        return known(value)
+    except ValueError:
+        raise InputError(f"{name} is {value!r}; there are: {', '.join(known)}") from None
+
+
+def _torque(boom: Boom, trajectories: Sequence[Trajectory], joint: int, payload_as: PayloadAs) -> Array:
+    parts = [
+        inverse_dynamics(boom, t.q, t.qd, t.qdd, payload_as=payload_as, friction=True, reactions=False).tau[:, joint]
+        for t in trajectories
+    ]
+    return read_only(np.concatenate(parts))
+
+
+def _checks(beam: Beam, H: Array, case: LoadCases) -> list[Check]:
+    """The worst load case by finite elements, as far as they model it."""
+    if case.clamp[0] > 0.0:
+        return []
+    solved: list[tuple[str, Solution]] = [
+        ("Euler-Bernoulli beam", solve_beam(beam, H, case, min(beam.slices, 1000))),
+        ("Timoshenko beam", solve_beam(beam, H, case, min(beam.slices, 1000), "timoshenko")),
+    ]
+    if beam.support == "cantilever":
+        solved.append(("plane stress", solve_plate(beam, H, case, 300, 4)))
+    inside = [(s.x > 0.1 * beam.length) & (s.x < 0.9 * beam.length) for _, s in solved]
+    return [
+        Check(name, s.elements, s.deflection, float(s.stress[part].max()))
+        for (name, s), part in zip(solved, inside, strict=True)
+    ]
+
+
+def _motors(
+    before: Boom, after: Boom, joint: int, trajectories: Sequence[Trajectory], payload_as: PayloadAs
+) -> list[MotorChoice]:
+    """Every motor of the catalogue on the joint's gearbox and supply, along all motions."""
+    drive = before.drives[joint]
+    if drive is None:
+        return []
+
+    def judged(boom: Boom, motor: Drive) -> tuple[Verdict, float | None]:
+        drives = tuple(motor if i == joint else d for i, d in enumerate(boom.drives))
+        rows = [
+            row
+            for t in trajectories
+            for row in check(replace(boom, drives=drives), t, payload_as=payload_as).rows
+            if row.joint == JOINTS[joint] and row.check.startswith("motor")
+        ]
+        order = [Verdict.INFO, Verdict.PASS, Verdict.WARN, Verdict.NOT_CHECKABLE, Verdict.FAIL]
+        margins = [r.margin for r in rows if r.margin is not None and "torque" in r.check and r.verdict is not Verdict.INFO]
+        return max((row.verdict for row in rows), key=order.index), min(margins, default=None)
+
+    choices = []
+    for motor in Catalogue.load().motors.values():
+        old, new = (judged(boom, replace(drive, motor=motor)) for boom in (before, after))
+        choices.append(MotorChoice(motor.name, motor.mass, old[0], new[0], old[1], new[1]))
+    return choices
+
+
+def _notes(
+    boom: Boom,
+    task: LinkTask,
+    link: Link,
+    beam: Beam,
+    cases: LoadCases,
+    trajectories: Sequence[Trajectory],
+    tapered: float,
+    bent: float,
+    old: ThesisDesign | None,
+) -> list[str]:
+    notes = []
+    if task.load == LoadFrom.THESIS:
+        notes.append(
+            "the thesis's load, 758.1 and 859.9 N, does not follow from its own move of table 3-1: the dynamics that gives its "
+            "table 2-8 gives -440.9 to 935.8 N along the link and 85.0 to 176.0 N across it; --load moves takes those of moves"
+        )
+    else:
+        notes.append(
+            "the loads are those of the moves given; what the boom does besides, and holding elsewhere, is not in them"
+        )
+        least = min(float(transmission_angle(t.q).min()) for t in trajectories)
+        if link.name != "extension" and least < boom.limits.transmission:
+            notes.append(
+                f"the linkage comes within {np.degrees(least):.2g} deg of flat: the loads there are those of its geometry"
+            )
+    if link.fittings is None:
+        notes.append("no fittings are known of this link: its new body is that of the plates alone, without pins and bosses")
+    elif link.fittings_origin is not None:
+        notes.append(f"fittings {link.fittings.mass:.3g} kg ({link.fittings_origin.basis}): {link.fittings_origin.source}")
+    if link.origin.basis != "printed":
+        notes.append(f"plates ({link.origin.basis}): {link.origin.source}")
+    if beam.material.origin.basis != "printed":
+        notes.append(f"material {beam.material.name} ({beam.material.origin.basis}): {beam.material.origin.source}")
+    notes.append("lateral bending and torsion, fatigue, welds, pin holes and local buckling of a plate's edge are not checked")
+    if bent > task.deflection * (1.0 + 1e-4):
+        notes.append(
+            f"with its own mass and shear it deflects {1e3 * bent:.3f} mm, above its limit; "
+            "the exact method with --shear holds that"
+        )
+    required = task.safety_factor * pressed(cases)
+    if required > 0.0 and tapered < required * (1.0 - 1e-5):
+        notes.append(
+            f"buckling: the tapered column holds {tapered:.0f} N, below {task.safety_factor:g} times the end load of "
+            f"{pressed(cases):.0f} N"
+        )
+    if old is not None:
+        notes.append("the thesis's method freezes the moments of its first stage and leaves out shear")
+    return notes
