@@ -1,5 +1,6 @@
 """The panel's own parts read back: colours of the path, arrows, planes, margins, texts, and several moves in one recording."""
 
+import json
 import re
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from boom_model.drives import STEPPER_MARGIN, available_torque
 from boom_model.frames import frame_transforms
 from boom_model.keep_out import Box, KeepOut
 from boom_model.provenance import Basis, Origin
+from planner import cli
 from planner.planning import Move, examine, plan
 from planner.profile_table import profile_markdown, profile_moves, profile_rows
 from planner.recording import write_moves_recording, write_recording
@@ -369,6 +371,38 @@ def test_moves_that_cannot_share_a_scene_are_refused(tmp_path: Path):
         with pytest.raises(InputError, match=message):
             write_moves_recording(tmp_path / "none.rrd", given, "")
     assert not list(tmp_path.iterdir())
+
+
+def boom(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
+    """The command's exit code."""
+    monkeypatch.setattr(sys, "argv", ["boom", *arguments])
+    with pytest.raises(SystemExit) as stop:
+        cli.main()
+    return int(stop.value.code or 0)
+
+
+def test_profiles_are_recorded_by_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any):
+    monkeypatch.chdir(tmp_path)
+    assert boom(monkeypatch, "profiles", "transport", "transport", "--out", "none.rrd") == 0  # empty moves
+    assert capsys.readouterr().out.endswith("recording: none.rrd\n")
+    assert boom(monkeypatch, "profiles", "transport", "phenotyping", "--json", "--out", "all.rrd") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["files"] == {"recording": "all.rrd"}
+    entities = Read(tmp_path / "all.rrd").entities()
+    assert {f"/world/moves/{entity_of(row['profile'])}/upper" for row in answer["profiles"]} <= entities
+    assert boom(monkeypatch, "profiles", "transport", "phenotyping", "--out", "none/all.rrd") == 2
+
+
+def test_reach_is_recorded_by_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any):
+    monkeypatch.chdir(tmp_path)
+    at_rest = ("plan", "transport", "transport", "--show-reach")
+    assert boom(monkeypatch, *at_rest, "--hold", "extension=0.25") == 0
+    assert "reach with hold extension 0.25" in Read(tmp_path / "move.rrd").titles()["/world"]
+    assert boom(monkeypatch, *at_rest, "--hold", "extension=5", "--out", "nothing.rrd") == 0
+    assert Read(tmp_path / "nothing.rrd").rows("/world/reach", "LineStrips3D:strips", static=True) == []
+    capsys.readouterr()
+    assert boom(monkeypatch, *at_rest, "--pitch", "free") == 2
+    assert capsys.readouterr().err == "boom: pitch free: the reach is drawn for one pitch\n"
 
 
 def test_one_package_knows_rerun():
