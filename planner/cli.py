@@ -133,6 +133,7 @@ def cli() -> None:
 @report_option
 @picture_option
 @vehicle_option
+@click.option("--show-reach", is_flag=True, help="Draw in the recording what the tip reaches under --pitch and --hold.")
 @boom_option
 @json_option
 def plan(
@@ -155,6 +156,7 @@ def plan(
     picture: str | None,
     document: str | None,
     vehicle: str | None,
+    show_reach: bool,
     boom_file: str | None,
     as_json: bool,
 ) -> int:
@@ -181,6 +183,8 @@ def plan(
     _check_picture(picture)
     check_writable(out, csv_file, picture)
     _require_document(document)
+    if show_reach and parse_pitch(pitch) is None:
+        raise InputError("pitch free: the reach is drawn for one pitch")
     targets = parse_target(start), parse_target(goal)
     options: dict[str, Any] = {
         "profile": profile,
@@ -211,8 +215,13 @@ def plan(
         report = replace(report, remedies=tuple(remedy.sentence for remedy in found))
     from planner.recording import write_recording
 
+    reach = None
+    if show_reach:
+        from boom_model.reach import reach_map
+
+        reach = reach_map(boom, options["hold"], options["pitch"])
     written = {"recording": out}
-    write_recording(out, move)
+    write_recording(out, move, reach=reach)
     if csv_file is not None:
         write_csv(move.trajectory, csv_file, move.loads.tau)
         written["csv"] = csv_file
@@ -233,6 +242,7 @@ def plan(
 @pitch_option
 @hold_option
 @payload_option
+@click.option("--out", metavar="FILE.rrd", help="A recording of all of them over each other, for `boom view`.")
 @boom_option
 @json_option
 def profiles(
@@ -243,6 +253,7 @@ def profiles(
     pitch: str,
     hold: str,
     payload: float | None,
+    out: str | None,
     boom_file: str | None,
     as_json: bool,
 ) -> int:
@@ -250,11 +261,13 @@ def profiles(
 
     \b
     Example:
-      boom profiles transport phenotyping --payload 20
+      boom profiles transport phenotyping --payload 20 --out profiles.rrd
     """
-    from planner.profile_table import HEADER, cells, profile_table
+    from planner.files import check_writable
+    from planner.profile_table import HEADER, cells, profile_markdown, profile_moves, profile_rows
 
-    rows = profile_table(
+    check_writable(out)
+    moves = profile_moves(
         _load(boom_file, payload),
         parse_target(start),
         parse_target(goal),
@@ -263,13 +276,22 @@ def profiles(
         pitch=parse_pitch(pitch),
         hold=parse_hold(hold),
     )
+    rows = profile_rows(moves)
+    written: dict[str, str] = {}
+    if out is not None:
+        from planner.recording import write_moves_recording
+
+        write_moves_recording(out, moves, profile_markdown(rows))
+        written["recording"] = out
     if as_json:
-        _print_json({"profiles": [asdict(row) for row in rows]})
+        _print_json({"profiles": [asdict(row) for row in rows], "files": written})
     else:
         table = _table(*HEADER)
         for row in rows:
             table.add_row(*cells(row))
         _console().print(table)
+        for kind, name in written.items():
+            click.echo(f"{kind}: {name}")
     return ANSWER_IS_NO if any(row.verdict == "FAIL" for row in rows) else 0
 
 

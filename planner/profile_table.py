@@ -1,5 +1,6 @@
 """The profiles side by side on one move."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,8 +37,8 @@ class ProfileRow:
 HEADER = ("profile", "duration", "velocity", "acceleration", "jerk", "gearbox", "motor torque", "motor speed", "worst stop")
 
 
-def profile_table(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[ProfileRow, ...]:
-    """Every profile's row for one move, the time-optimal one also with its jerk bounded.
+def profile_moves(boom: Boom, start: Target, goal: Target, **options: Any) -> dict[str, Move]:
+    """One move with every profile, the time-optimal one also with its jerk bounded, by name.
 
     Args:
         options: of `plan`, other than the profile's.
@@ -45,9 +46,25 @@ def profile_table(boom: Boom, start: Target, goal: Target, **options: Any) -> tu
     Raises:
         InputError, InfeasibleError: as `plan`.
     """
-    rows = [_row(profile, plan(boom, start, goal, profile=profile, **options)) for profile in Profile]
+    moves = {str(profile): plan(boom, start, goal, profile=profile, **options) for profile in Profile}
     smooth = plan(boom, start, goal, profile=Profile.TIME_OPTIMAL, jerk_bound=True, **options)
-    return (*rows, _row("time-optimal, jerk bound", smooth))
+    return moves | {"time-optimal, jerk bound": smooth}
+
+
+def profile_table(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[ProfileRow, ...]:
+    """The rows of `profile_moves`, with the same arguments."""
+    return profile_rows(profile_moves(boom, start, goal, **options))
+
+
+def profile_rows(moves: Mapping[str, Move]) -> tuple[ProfileRow, ...]:
+    """A row for each move, by name."""
+    return tuple(_row(name, move) for name, move in moves.items())
+
+
+def profile_markdown(rows: Sequence[ProfileRow]) -> str:
+    """The rows as a table in Markdown."""
+    lines = [" | ".join(HEADER), " | ".join("---" for _ in HEADER), *(" | ".join(cells(row)) for row in rows)]
+    return "\n".join(f"| {line} |" for line in lines) + "\n"
 
 
 def cells(row: ProfileRow) -> tuple[str, ...]:
