@@ -1,5 +1,6 @@
 """The profiles side by side on one move."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from boom_model import Boom
 from planner.constraints import jerk_stretch
+from planner.markdown import table
 from planner.planning import Move, plan
 from planner.report import Report
 from planner.targets import Target
@@ -37,8 +39,8 @@ class ProfileRow:
 HEADER = ("profile", "duration", "velocity", "acceleration", "jerk", "gearbox", "motor torque", "motor speed", "worst stop")
 
 
-def profile_table(boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any) -> tuple[ProfileRow, ...]:
-    """Every profile's row for one move, the time-optimal one also with its jerk bounded.
+def profile_moves(boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any) -> dict[str, Move]:
+    """One move with every profile, the time-optimal one also with its jerk bounded, by name.
 
     Args:
         track: iterates over the profiles, and may show how far it is.
@@ -47,9 +49,24 @@ def profile_table(boom: Boom, start: Target, goal: Target, track: Track = iter, 
     Raises:
         InputError, InfeasibleError: as `plan`.
     """
-    timings: list[tuple[str, dict[str, Any]]] = [(profile, {"profile": profile}) for profile in Profile]
+    timings: list[tuple[str, dict[str, Any]]] = [(profile.value, {"profile": profile}) for profile in Profile]
     timings.append(("time-optimal, jerk bound", {"profile": Profile.TIME_OPTIMAL, "jerk_bound": True}))
-    return tuple(_row(name, plan(boom, start, goal, **timing, **options)) for name, timing in track(timings))
+    return {name: plan(boom, start, goal, **timing, **options) for name, timing in track(timings)}
+
+
+def profile_table(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[ProfileRow, ...]:
+    """The rows of `profile_moves`, with the same arguments."""
+    return profile_rows(profile_moves(boom, start, goal, **options))
+
+
+def profile_rows(moves: Mapping[str, Move]) -> tuple[ProfileRow, ...]:
+    """A row for each move, by name."""
+    return tuple(_row(name, move) for name, move in moves.items())
+
+
+def profile_markdown(rows: Sequence[ProfileRow]) -> str:
+    """The rows as a table in Markdown."""
+    return "\n".join(table(HEADER, map(cells, rows))) + "\n"
 
 
 def cells(row: ProfileRow) -> tuple[str, ...]:

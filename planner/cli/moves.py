@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from boom_model import Boom, InfeasibleError
+from boom_model import Boom, InfeasibleError, InputError
 from planner.cli.options import (
     boom_option,
     check_picture,
@@ -21,7 +21,7 @@ from planner.cli.options import (
     report_option,
     vehicle_option,
 )
-from planner.cli.printing import ANSWER_IS_NO, print_json, print_lines, print_report, print_rows, tracked
+from planner.cli.printing import ANSWER_IS_NO, print_files, print_json, print_lines, print_report, print_rows, tracked
 from planner.targets import parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target
 
 if TYPE_CHECKING:
@@ -59,6 +59,7 @@ if TYPE_CHECKING:
 @report_option
 @picture_option
 @vehicle_option
+@click.option("--show-reach", is_flag=True, help="Draw in the recording what the tip reaches under --pitch and --hold.")
 @boom_option
 @json_option
 def plan(
@@ -81,6 +82,7 @@ def plan(
     picture: str | None,
     document: str | None,
     vehicle: str | None,
+    show_reach: bool,
     boom_file: str | None,
     as_json: bool,
 ) -> int:
@@ -107,6 +109,8 @@ def plan(
     check_picture(picture)
     check_report(document)
     check_writable(out, csv_file, picture, document)
+    if show_reach and parse_pitch(pitch) is None:
+        raise InputError("pitch free: the reach is drawn for one pitch")
     targets = parse_target(start), parse_target(goal)
     options: dict[str, Any] = {
         "profile": profile,
@@ -137,8 +141,13 @@ def plan(
         report = replace(report, remedies=tuple(remedy.sentence for remedy in found))
     from planner.recording import write_recording
 
+    reach = None
+    if show_reach:
+        from boom_model.reach import reach_map
+
+        reach = reach_map(boom, options["hold"], options["pitch"])
     written = {"recording": out}
-    write_recording(out, move)
+    write_recording(out, move, reach=reach)
     if csv_file is not None:
         write_csv(move.trajectory, csv_file, move.loads.tau)
         written["csv"] = csv_file
@@ -159,6 +168,7 @@ def plan(
 @pitch_option
 @hold_option
 @payload_option
+@click.option("--out", metavar="FILE.rrd", help="A recording of all of them over each other, for `boom view`.")
 @boom_option
 @json_option
 def profiles(
@@ -169,6 +179,7 @@ def profiles(
     pitch: str,
     hold: str,
     payload: float | None,
+    out: str | None,
     boom_file: str | None,
     as_json: bool,
 ) -> int:
@@ -176,11 +187,13 @@ def profiles(
 
     \b
     Example:
-      boom profiles transport phenotyping --payload 20
+      boom profiles transport phenotyping --payload 20 --out profiles.rrd
     """
-    from planner.profile_table import HEADER, cells, profile_table
+    from planner.files import check_writable
+    from planner.profile_table import HEADER, cells, profile_markdown, profile_moves, profile_rows
 
-    rows = profile_table(
+    check_writable(out)
+    moves = profile_moves(
         load_boom(boom_file, payload),
         parse_target(start),
         parse_target(goal),
@@ -190,10 +203,18 @@ def profiles(
         pitch=parse_pitch(pitch),
         hold=parse_hold(hold),
     )
+    rows = profile_rows(moves)
+    written: dict[str, str] = {}
+    if out is not None:
+        from planner.recording import write_moves_recording
+
+        write_moves_recording(out, moves, profile_markdown(rows))
+        written["recording"] = out
     if as_json:
-        print_json({"profiles": [asdict(row) for row in rows]})
+        print_json({"profiles": [asdict(row) for row in rows], "files": written})
     else:
         print_rows(HEADER, map(cells, rows))
+        print_files(written)
     return ANSWER_IS_NO if any(row.verdict == "FAIL" for row in rows) else 0
 
 

@@ -1,0 +1,105 @@
+"""Pin forces and the wrench on the mount as arrows over time."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+
+from boom_model import Boom, Loads
+from boom_model.arrays import Array
+from boom_model.frames import frame_transforms
+from planner.recording.palette import LIGHT, PURPLE, Color
+from planner.recording.scene import POSES_AT_ONCE
+from planner.recording.stream import time_column
+
+LONGEST = 0.9
+"""Bound of the longest arrow [m]."""
+
+_PIN_END = 0.1  # [m]: at the pin's end on the boom's right, clear of the links
+_PINS = {6: "of the lower link on the outer", 7: "of the outer link on the upper", 8: "of the inner link on the upper"}
+_FORCE, _MOMENT = LIGHT, PURPLE
+
+
+WHAT_ARROWS_SHOW = (
+    f"Arrows, to the scale in the view's title: the force {', '.join(f'{name} at pin {pin}' for pin, name in _PINS.items())}, "
+    "from the pin's end; force and moment of the boom on its mount, from the origin of frame 1."
+)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What a metre of arrow stands for; None where there is nothing to draw."""
+
+    force: float | None
+    """[N]"""
+    moment: float | None
+    """[Nm]"""
+
+    @property
+    def sentence(self) -> str:
+        """For a title."""
+        shown = [f"1 m = {value:g} {unit}" for value, unit in ((self.force, "N"), (self.moment, "Nm")) if value is not None]
+        return f"arrows: {', '.join(shown)}" if shown else "no arrows"
+
+
+def arrow_scale(loads: Loads) -> Scale:
+    """The least of 1, 2, 5, 10... N and Nm a metre that keep every arrow of a motion below LONGEST."""
+    if loads.pins is None or loads.mount is None:
+        return Scale(None, None)
+    forces = [*(getattr(loads.pins, f"frame_{pin}") for pin in _PINS), loads.mount[:, :3]]
+    return Scale(_round_up(max(_largest(force) for force in forces)), _round_up(_largest(loads.mount[:, 3:])))
+
+
+def _largest(vectors: Array) -> float:
+    return float(np.sqrt((vectors**2).sum(axis=-1).max()))
+
+
+def _round_up(largest: float) -> float | None:
+    if not largest > 0.0:
+        return None
+    least = largest / LONGEST
+    power = 10.0 ** np.floor(np.log10(least))
+    return float(next(step * power for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step * power >= least))
+
+
+def log_arrows(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, loads: Loads, scale: Scale) -> None:
+    """Forces at pins 6, 7 and 8, and force and moment of the boom on its mount, in "mount" to that scale."""
+    if loads.pins is None or loads.mount is None:
+        return
+    for pin in _PINS:
+        _log_look(recording, f"pin_{pin}", f"pin {pin}", _FORCE)
+    _log_look(recording, "mount_force", "force", _FORCE)
+    _log_look(recording, "mount_moment", "moment", _MOMENT)
+    for start in range(0, len(t), POSES_AT_ONCE):
+        part = slice(start, start + POSES_AT_ONCE)
+        for name, origins, vectors in _arrows(boom, q[part], loads, part, scale):
+            arrows = rr.Arrows3D.columns(vectors=vectors, origins=origins)
+            recording.send_columns(f"world/loads/{name}", [time_column(t[part])], arrows)
+
+
+def _arrows(boom: Boom, q: Array, loads: Loads, part: slice, scale: Scale) -> Iterator[tuple[str, Array, Array]]:
+    """Name, foot and vector (n, 3) [m] of each arrow."""
+    assert loads.pins is not None
+    assert loads.mount is not None
+    c, s = np.cos(q[:, 0]), np.sin(q[:, 0])
+    frames = frame_transforms(boom, q, "outer")[..., :3, 3]
+    right = np.stack([s, -c, np.zeros_like(c)], axis=-1)
+    for pin in _PINS:
+        x, y, z = getattr(loads.pins, f"frame_{pin}")[part].T
+        if scale.force is not None:
+            yield (
+                f"pin_{pin}",
+                frames[:, pin - 1] + _PIN_END * right,
+                np.stack([c * x - s * y, s * x + c * y, z], -1) / scale.force,
+            )
+    foot = np.zeros((len(q), 3))
+    if scale.force is not None:
+        yield "mount_force", foot, loads.mount[part, :3] / scale.force
+    if scale.moment is not None:
+        yield "mount_moment", foot, loads.mount[part, 3:] / scale.moment
+
+
+def _log_look(recording: rr.RecordingStream, name: str, label: str, color: Color) -> None:
+    look = rr.Arrows3D.from_fields(colors=[color], radii=[0.02], labels=[label], show_labels=True)
+    recording.log(f"world/loads/{name}", look, rr.CoordinateFrame("mount"), static=True)

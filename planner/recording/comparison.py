@@ -1,0 +1,92 @@
+"""A measured motion over its plan."""
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from boom_model import JOINTS, forward_kinematics
+from boom_model.boom import IS_LENGTH
+from planner.comparison import Comparison
+from planner.recording.layout import eye_of, grid, scene, shown_beside, text
+from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, PAYLOAD_COLOR
+from planner.recording.plots import Bundle, for_people
+from planner.recording.scene import (
+    PLANNED,
+    ground_level,
+    log_edges,
+    log_motion,
+    log_mount,
+    log_path,
+    log_solids,
+    log_surroundings,
+)
+from planner.recording.stream import log_markdown, save
+
+_LEGEND = "Solid bodies and the light path: measured. Edges and the orange path: planned."
+
+
+def write_comparison_recording(path: str | Path, comparison: Comparison) -> None:
+    """Writes a measured motion over its plan, with its blueprint. The entities are those of a move, but that
+
+    /world/boom             is the measured motion, solid, and /world/tip_path its tip's
+    /world/planned          is the planned one, its edges alone; frames "planned <body>" in "mount"; and its tip's path
+    /plots/<quantity>/<joint>   q and tau hold both, tau the measured torques too where the log has them
+    /plots/error/<joint>    measured less planned, in deg and m; /plots/error/tip the distance of the tips [mm]
+
+    Args:
+        path: the .rrd file.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    boom, planned, measured = comparison.boom, comparison.planned, comparison.measured
+    bundles = _bundles(comparison)
+    tips = [forward_kinematics(boom, motion.q).position for motion in (measured, planned)]
+    reached = np.concatenate(tips)
+
+    def log(recording: rr.RecordingStream) -> None:
+        tabs = [grid(name, tab) for name, tab in bundles.items()]
+        right = rrb.Tabs(*tabs, text("report", "Report"), active_tab=0)
+        view = scene("Boom [m]", eye_of(boom, planned.q), ground_level(boom, reached))
+        recording.send_blueprint(shown_beside(view, right, [1, 1]))
+        notes = "\n".join(f"- {note}" for note in (_LEGEND, *comparison.notes))
+        log_markdown(recording, "report", notes)
+        log_mount(recording, planned.t, None)
+        log_solids(recording, boom)
+        log_edges(recording, boom, PLANNED)
+        log_motion(recording, boom, planned.t, measured.q)
+        log_motion(recording, boom, planned.t, planned.q, PLANNED)
+        log_surroundings(recording, boom, reached)
+        log_path(recording, "world/tip_path", tips[0], PAYLOAD_COLOR)
+        log_path(recording, "world/planned/tip_path", tips[1], LIMIT_COLOR)
+        for bundle in (bundle for tab in bundles.values() for bundle in tab):
+            bundle.log(recording, planned.t)
+
+    save(path, f"{boom.name}: measured and planned", log)
+
+
+def _bundles(c: Comparison) -> dict[str, list[Bundle]]:
+    tabs: dict[str, list[Bundle]] = {"Errors": [], "Torques": [], "Positions": []}
+    millimetres = c.tip_error[:, None] * 1e3
+    tabs["Errors"].append(
+        Bundle("plots/error/tip", "distance of the tips [mm]", ["distance [mm]"], [PAYLOAD_COLOR], millimetres)
+    )
+    for i, joint in enumerate(JOINTS):
+        unit, force = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
+        color, pair = JOINT_COLORS[joint], ["planned", "measured"]
+        both = [LIMIT_COLOR, color]
+        positions = np.stack([for_people(i, motion.q[:, i]) for motion in (c.planned, c.measured)], axis=-1)
+        tabs["Positions"].append(Bundle(f"plots/q/{joint}", f"{joint} position [{unit}]", pair, both, positions))
+        error = for_people(i, c.joint_error[:, i, None])
+        title = f"{joint}: measured less planned [{unit}]"
+        tabs["Errors"].append(Bundle(f"plots/error/{joint}", title, ["measured less planned"], [color], error))
+        names, colors, torques = ["planned", "measured motion, by the model"], both, [c.tau_planned, c.tau_measured]
+        if c.tau_logged is not None:
+            names, colors = [*names, "measured"], [*both, PAYLOAD_COLOR]
+            torques.append(c.tau_logged)
+        values = np.stack([tau[:, i] for tau in torques], axis=-1)
+        name = "force" if IS_LENGTH[i] else "torque"
+        tabs["Torques"].append(Bundle(f"plots/tau/{joint}", f"{joint} {name} [{force}]", names, colors, values))
+    return tabs

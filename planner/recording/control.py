@@ -1,0 +1,113 @@
+"""A study of the closed loop."""
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from boom_model import JOINTS, forward_kinematics
+from boom_model.boom import IS_LENGTH
+from planner.control.picture import PALETTE, error_figure, loop_figure, png
+from planner.control.study import Study
+from planner.recording.layout import eye_of, scene, shown_beside, text
+from planner.recording.palette import COLORS, LIMIT_COLOR, PAYLOAD_COLOR
+from planner.recording.plots import Bundle, for_people
+from planner.recording.scene import ground_level, log_motion, log_mount, log_path, log_solids, log_surroundings
+from planner.recording.stream import log_markdown, log_png, save
+
+
+def write_control_recording(path: str | Path, study: Study, *, step: float = 0.005) -> None:
+    """Writes a study's recording: the boom as the first case moves it, every case's curves, pictures and report.
+
+    /world                                    the boom following the first case
+    /tip_error/<profile>/<shaper>             of every controller [mm]
+    /cases/<profile>/<controller>/<shaper>/   q/<joint> commanded, link and motor; error/<joint>; tau/<joint> asked and limit
+    /pictures/loops, /pictures/errors         Bode, poles and the tip's error as images
+    /report                                   the report as Markdown
+
+    Args:
+        path: the .rrd file.
+        step: sampling step of the curves [s]; a controller's own period would make a file of some 100 MB.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    run, boom = study.run, study.boom
+    every = slice(None, None, max(1, round(step / float(run.t[1]))))
+    t, q = run.t[every], run.q[every, 0]
+    names = [f"{row.profile}/{row.controller}/{row.shaper}" for row in study.rows]
+    errors = _tip_errors(study, every)
+    tabs = {name: _case_bundles(study, b, every, name) for b, name in enumerate(names)}
+    pictures = {"errors": png(error_figure(study))} | ({"loops": png(loop_figure(study))} if study.designs else {})
+
+    def log(recording: rr.RecordingStream) -> None:
+        grids = [rrb.Grid(*(bundle.view for bundle in tab), grid_columns=3, name=name) for name, tab in tabs.items()]
+        images = [rrb.Spatial2DView(origin=f"/pictures/{name}", name=name) for name in pictures]
+        errors_tab = rrb.Vertical(*(bundle.view for bundle in errors), name="Tip error")
+        right = rrb.Tabs(errors_tab, *images, text("report", "Report"), *grids, active_tab=0)
+        tip = forward_kinematics(boom, q).position
+        view = scene(f"Boom [m], {names[0]}", eye_of(boom, q), ground_level(boom, tip))
+        recording.send_blueprint(shown_beside(view, right, [1, 2]))
+        log_markdown(recording, "report", study.to_markdown())
+        log_mount(recording, t, study.setup.vehicle)
+        log_solids(recording, boom)
+        log_motion(recording, boom, t, q)
+        log_surroundings(recording, boom, tip)
+        log_path(recording, "world/tip_path", tip, PAYLOAD_COLOR)
+        for bundle in (*errors, *(bundle for tab in tabs.values() for bundle in tab)):
+            bundle.log(recording, t)
+        for name, content in pictures.items():
+            log_png(recording, f"pictures/{name}", content)
+
+    save(path, f"{boom.name}: closed loop", log)
+
+
+def _tip_errors(study: Study, every: slice) -> list[Bundle]:
+    """The tip's error of all controllers, by profile and shaper."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for b, row in enumerate(study.rows):
+        groups.setdefault((row.profile, row.shaper), []).append(b)
+    return [
+        Bundle(
+            f"tip_error/{profile}/{shaper}",
+            f"{profile}, shaper {shaper}: tip error [mm]",
+            [study.rows[b].controller for b in cases],
+            PALETTE[: len(cases)],
+            1e3 * study.tip_error[every][:, cases],
+        )
+        for (profile, shaper), cases in groups.items()
+    ]
+
+
+def _case_bundles(study: Study, b: int, every: slice, name: str) -> list[Bundle]:
+    """Of case b: commanded and actual position, error, and torque with its limit, of each joint."""
+    run = study.run
+    ours, theirs = COLORS["extension"], COLORS["upper"]
+    bundles = []
+    for i, joint in enumerate(JOINTS):
+        unit, torque = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
+        q = [for_people(i, x[every, b, i]) for x in (run.command, run.q, run.motor)]
+        limit = run.limit[every, b, i]
+        tau, names = [run.torque[every, b, i]], ["asked of the drive"]
+        if np.isfinite(limit).all():
+            tau += [limit, -limit]
+            names += ["motor's limit (estimated)"] * 2
+        bundles += [
+            Bundle(
+                f"cases/{name}/q/{joint}",
+                f"{joint} position [{unit}]",
+                ["commanded", "link", "motor"],
+                [LIMIT_COLOR, ours, theirs],
+                np.stack(q, axis=-1),
+            ),
+            Bundle(f"cases/{name}/error/{joint}", f"{joint} error [{unit}]", ["link"], [ours], (q[1] - q[0])[:, None]),
+            Bundle(
+                f"cases/{name}/tau/{joint}",
+                f"{joint} [{torque}]",
+                names,
+                [ours, LIMIT_COLOR, LIMIT_COLOR][: len(tau)],
+                np.stack(tau, axis=-1),
+            ),
+        ]
+    return bundles

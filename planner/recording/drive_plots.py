@@ -1,0 +1,107 @@
+"""What motors and gearboxes bear over time beside their ratings, their margins, and what the tip deflects."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from boom_model import JOINTS, Basis, Drive, tip_deflection
+from boom_model.arrays import Array
+from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque
+from planner.planning import Move
+from planner.recording.palette import (
+    GREEN,
+    JOINT_COLORS,
+    LIMIT_COLOR,
+    ORANGE,
+    PAYLOAD_COLOR,
+    PURPLE,
+    SKY_BLUE,
+    TOTAL_COLOR,
+)
+from planner.recording.plots import Bundle
+
+MOST_MARGIN = 3.0
+"""Where the curves of margins are cut off: nothing asked is an infinite margin."""
+
+
+def motor_bundles(move: Move) -> Iterator[Bundle]:
+    """Each motor's torque beside its curve, as sizes."""
+    motion = move.trajectory
+    for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
+        if drive is None:
+            continue
+        torque = motor_torque(drive, move.loads.tau[:, i], motion.qd[:, i], motion.qdd[:, i])
+        curve = available_torque(drive, drive.gearbox.ratio * motion.qd[:, i])
+        if torque is not None and curve is not None:
+            basis = _basis(drive)
+            names = ["torque [Nm]", f"available ({basis}) [Nm]", f"with {STEPPER_MARGIN:.0%} margin ({basis}) [Nm]"]
+            values = np.stack([np.abs(torque), curve, curve / (1.0 + STEPPER_MARGIN)], axis=-1)
+            colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, LIMIT_COLOR]
+            yield Bundle(f"plots/motor/{joint}", f"{joint}, {drive.motor.name} [Nm]", names, colors, values)
+
+
+def gearbox_bundles(move: Move) -> Iterator[Bundle]:
+    """Each gearbox's torque beside its ratings, as sizes."""
+    tau = np.abs(move.loads.tau)
+    for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
+        if drive is None:
+            continue
+        gear = drive.gearbox
+        ratings = {
+            "rated": gear.continuous_torque,
+            "largest average": gear.max_average_torque,
+            "start-stop": gear.start_stop_torque,
+        }
+        known = {name: value for name, value in ratings.items() if value is not None}
+        names = ["torque [Nm]", *(f"{name} [Nm]" for name in known)]
+        values = np.stack([tau[:, i], *(np.full(len(tau), value) for value in known.values())], axis=-1)
+        colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, ORANGE, LIMIT_COLOR]
+        yield Bundle(f"plots/gearbox/{joint}", f"{joint}, {gear.name} [Nm]", names, colors[: len(names)], values)
+
+
+def margin_bundles(move: Move) -> Iterator[Bundle]:
+    """Margins (limit - demand) / demand over time [%], as the checks count them, beside what is required.
+
+    Of each gearbox to its start-stop and its momentary peak torque, of each motor to what its curve leaves.
+    """
+    motion, tau = move.trajectory, np.abs(move.loads.tau)
+    for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
+        if drive is None:
+            continue
+        gear, curves, required = drive.gearbox, {}, {"gearbox, required": 0.0}
+        for name, rating in (("start-stop", gear.start_stop_torque), ("momentary peak", gear.peak_torque)):
+            if rating is not None:
+                curves[f"gearbox, {name}"] = margin(tau[:, i], np.full(len(tau), rating))
+        torque = motor_torque(drive, move.loads.tau[:, i], motion.qd[:, i], motion.qdd[:, i])
+        curve = available_torque(drive, gear.ratio * motion.qd[:, i])
+        if torque is not None and curve is not None:
+            curves[f"motor ({_basis(drive)})"] = margin(np.abs(torque), curve)
+            required["motor, required"] = STEPPER_MARGIN
+        shown = [*curves.values(), *(np.full(len(tau), value) for value in required.values())]
+        names = [f"{name} [%]" for name in (*curves, *required)]
+        kinds = {"gearbox, start-stop": JOINT_COLORS[joint], "gearbox, momentary peak": PURPLE}
+        colors = [*(kinds.get(name, TOTAL_COLOR) for name in curves), *(LIMIT_COLOR, ORANGE)[: len(required)]]
+        title = f"{joint}: (limit - demand) / demand, up to {MOST_MARGIN:.0%} [%]"
+        if curves:
+            yield Bundle(f"plots/margin/{joint}", title, names, colors, 100.0 * np.stack(shown, axis=-1))
+
+
+def margin(demand: Array, limit: Array) -> Array:
+    """(limit - demand) / demand (n,), at most MOST_MARGIN."""
+    spare = limit - demand
+    least = np.maximum(demand, limit / (1.0 + MOST_MARGIN) + np.finfo(float).tiny)
+    return np.minimum(spare / least, MOST_MARGIN)
+
+
+def tip_bundle(move: Move) -> Bundle:
+    """The error budget of the tip [mm]."""
+    budget = tip_deflection(move.boom, move.trajectory.q, move.loads.tau)
+    parts = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
+    names = [f"{name} [mm]" for name in ("wind-up", "hysteresis", "backlash", "step error", "in all")]
+    values = np.stack(parts, axis=-1) * 1e3
+    colors = [SKY_BLUE, ORANGE, GREEN, PURPLE, TOTAL_COLOR]
+    return Bundle("plots/tip/deflection", "tip's deflection by the drives, at most [mm]", names, colors, values)
+
+
+def _basis(drive: Drive) -> Basis:
+    return Basis.weakest([Basis.ESTIMATED, *(origin.basis for origin in drive.supply_origins)])

@@ -1,0 +1,127 @@
+"""Every joint's position, rates and torque beside their limits, where the torques come from, and pins and mount."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from boom_model import JOINTS, Basis, Boom, Breakdown, Loads
+from boom_model.arrays import Array
+from boom_model.boom import IS_LENGTH, Mount
+from boom_model.drives import drive_inertia, drive_torque_limit
+from planner.recording.palette import (
+    COLORS,
+    GREEN,
+    GREY,
+    JOINT_COLORS,
+    LIMIT_COLOR,
+    ORANGE,
+    PART_COLORS,
+    PURPLE,
+    SKY_BLUE,
+    TOTAL_COLOR,
+    YELLOW,
+)
+from planner.recording.plots import Bundle, Plot, for_people
+from planner.trajectory import Trajectory
+
+MOST_RATIO = 5.0
+"""Where the curves of torque / limit are cut off: a motor too fast for any torque has no bound."""
+
+
+def position_plots(boom: Boom, trajectory: Trajectory) -> list[Plot]:
+    """Joint positions, and the angle between the driven links."""
+    limits = boom.limits
+    linkage = Plot(
+        "plots/q/linkage",
+        "lower - inner",
+        "deg",
+        COLORS["upper"],
+        np.degrees(trajectory.q[:, 2] - trajectory.q[:, 1]),
+        {"lower limit": float(np.degrees(limits.linkage))},
+        limits.origins["linkage"][0].basis,
+    )
+    return [*_joint_plots(boom, "q", "position", "", trajectory.q, limits.lower, limits.upper), linkage]
+
+
+def velocity_plots(boom: Boom, trajectory: Trajectory) -> list[Plot]:
+    """Joint velocities."""
+    most = boom.limits.velocity
+    return list(_joint_plots(boom, "qd", "velocity", "/s", trajectory.qd, -most, most))
+
+
+def acceleration_plots(boom: Boom, trajectory: Trajectory) -> list[Plot]:
+    """Joint accelerations."""
+    most = boom.limits.acceleration
+    return list(_joint_plots(boom, "qdd", "acceleration", "/s^2", trajectory.qdd, -most, most))
+
+
+def _joint_plots(boom: Boom, quantity: str, name: str, per: str, values: Array, lower: Array, upper: Array) -> Iterator[Plot]:
+    """One of q, qd and qdd: values (n, 5) between lower and upper (5,), in SI."""
+    for i, joint in enumerate(JOINTS):
+        low, high = for_people(i, np.array([lower[i], upper[i]]))
+        yield Plot(
+            f"plots/{quantity}/{joint}",
+            f"{joint} {name}",
+            f"{'m' if IS_LENGTH[i] else 'deg'}{per}",
+            JOINT_COLORS[joint],
+            for_people(i, values[:, i]),
+            {"lower limit": float(low), "upper limit": float(high)},
+            boom.limits.origins[name][i].basis,
+        )
+
+
+def torque_plots(boom: Boom, trajectory: Trajectory, tau: Array) -> Iterator[Plot]:
+    """Joint torques beside what the drive leaves for them, sample by sample.
+
+    That is -T - J qdd to T - J qdd, with T(qd) what the drive allows at the joint's speed and J its own inertia, which it
+    drives too: a curve between its limits is a drive that keeps `drive_torque_limit`.
+    """
+    for i, (joint, drive) in enumerate(zip(JOINTS, boom.drives, strict=True)):
+        limit = None if drive is None else drive_torque_limit(drive, trajectory.qd[:, i])
+        limits: dict[str, float | Array] = {}
+        if drive is not None and limit is not None:
+            own = drive_inertia(drive) * trajectory.qdd[:, i]
+            limits = {"drive's lower limit": -limit - own, "drive's upper limit": limit - own}
+        basis = Basis.weakest([Basis.ESTIMATED, *([] if drive is None else [o.basis for o in drive.supply_origins])])
+        name, unit = ("force", "N") if IS_LENGTH[i] else ("torque", "Nm")
+        yield Plot(f"plots/tau/{joint}", f"{joint} {name}", unit, JOINT_COLORS[joint], tau[:, i], limits, basis)
+
+
+def ratio_bundles(ratios: dict[str, Array]) -> list[Bundle]:
+    """Torque / limit of every driven joint, in one view beside 1; none where no drive's limit is known."""
+    if not ratios:
+        return []
+    values = [*(np.minimum(ratio, MOST_RATIO) for ratio in ratios.values())]
+    values.append(np.ones_like(values[0]))
+    colors = [*(JOINT_COLORS[joint] for joint in ratios), LIMIT_COLOR]
+    title = f"torque / limit, up to {MOST_RATIO:g} [-]"
+    return [Bundle("plots/ratio", title, [*ratios, "limit"], colors, np.stack(values, axis=-1))]
+
+
+def part_bundles(parts: Breakdown) -> Iterator[Bundle]:
+    """Each joint's torque in parts that add up to it."""
+    names, each, total = [*PART_COLORS, "total"], [getattr(parts, name) for name in PART_COLORS], parts.total
+    for i, joint in enumerate(JOINTS):
+        unit = "N" if IS_LENGTH[i] else "Nm"
+        values = np.stack([part[:, i] for part in (*each, total)], axis=-1)
+        yield Bundle(f"plots/parts/{joint}", f"{joint} [{unit}]", names, [*PART_COLORS.values(), TOTAL_COLOR], values)
+
+
+def load_bundles(mount: Mount, loads: Loads) -> Iterator[Bundle]:
+    """Force and moment on the mount, and the sizes of the forces at the pins."""
+    if loads.mount is None or loads.pins is None:
+        return
+    for kind, unit, columns, limit in (("force", "N", slice(0, 3), mount.force), ("moment", "Nm", slice(3, 6), mount.moment)):
+        vectors = loads.mount[:, columns]
+        names, colors = ["x", "y", "z", "size"], [SKY_BLUE, ORANGE, PURPLE, GREY]
+        series = [*vectors.T, np.linalg.norm(vectors, axis=-1)]
+        if limit is not None:
+            names.append("limit" if limit.origin.basis is Basis.PRINTED else f"limit ({limit.origin.basis})")
+            colors.append(LIMIT_COLOR)
+            series.append(np.full(len(vectors), limit.value))
+        title = f"{kind} on the mount [{unit}]"
+        yield Bundle(f"plots/mount/{kind}", title, [f"{n} [{unit}]" for n in names], colors, np.stack(series, axis=-1))
+    pins = {6: loads.pins.frame_6, 7: loads.pins.frame_7, 8: loads.pins.frame_8}
+    sizes = np.stack([np.linalg.norm(force, axis=-1) for force in pins.values()], axis=-1)
+    names = [f"pin {pin} [N]" for pin in pins]
+    yield Bundle("plots/pins", "forces at the pins, in size [N]", names, [YELLOW, GREEN, SKY_BLUE], sizes)

@@ -1,0 +1,55 @@
+"""How a recording is shown: the scene on the left, tabs on the right."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from boom_model import Boom
+from boom_model.arrays import Array
+from boom_model.frames import frame_transforms
+from planner.recording.plots import Bundle, Plot
+
+
+def grid(name: str, plots: Iterable[Plot | Bundle]) -> rrb.Grid:
+    """A tab of plots, two beside each other where there are more than two."""
+    views = [plot.view for plot in plots]
+    return rrb.Grid(*views, grid_columns=2 if len(views) > 2 else 1, name=name)
+
+
+def text(entity: str, name: str) -> rrb.TextDocumentView:
+    """A tab of Markdown."""
+    return rrb.TextDocumentView(origin=f"/{entity}", name=name)
+
+
+def scene(title: str, eye: rrb.EyeControls3D, ground: float = 0.0) -> rrb.Spatial3DView:
+    """The view of /world, with a grid at the height of the ground [m]."""
+    grid = rrb.LineGrid3D(plane=rr.components.Plane3D.XY.with_distance(ground), color=(70, 70, 70))
+    return rrb.Spatial3DView(origin="/world", name=title, eye_controls=eye, line_grid=grid)
+
+
+def shown_beside(left: rrb.View | rrb.Container, right: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blueprint:
+    """A blueprint without the viewer's own panels."""
+    return rrb.Blueprint(
+        rrb.Horizontal(left, right, column_shares=shares),
+        rrb.TimePanel(timeline="t", state="collapsed"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+    )
+
+
+def eye_of(boom: Boom, *motions: Array) -> rrb.EyeControls3D:
+    """From the boom's right at the middle of its first motion (n, 5), a little from above, and far enough off to see all."""
+    some = np.concatenate([q[:: max(1, len(q) // 1000)] for q in motions])
+    points = frame_transforms(boom, some, "outer")[..., :3, 3].reshape(-1, 3)
+    return eye_on(points, float(motions[0][len(motions[0]) // 2, 0]))
+
+
+def eye_on(points: Array, yaw: float, away: float = 0.95) -> rrb.EyeControls3D:
+    """From the right of a boom at `yaw`, a little from above, and far enough `away` to see all points (k, 3)."""
+    center = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    direction = np.array([np.sin(yaw), -np.cos(yaw), 0.5])
+    distance = 0.5 + away * float(np.linalg.norm(np.ptp(points, axis=0)))
+    eye = center + distance * direction / np.linalg.norm(direction)
+    return rrb.EyeControls3D(position=eye, look_target=center, eye_up=(0.0, 0.0, 1.0))

@@ -1,0 +1,90 @@
+"""A designed link on the boom."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from boom_model import JOINTS, forward_kinematics
+from boom_model.frames import R_LINK_BODY
+from planner.link_picture import write_link_picture
+from planner.link_report import title, to_markdown
+from planner.links import LinkDesign
+from planner.recording.layout import eye_of, scene, shown_beside, text
+from planner.recording.palette import COLORS, LIMIT_COLOR, PAYLOAD_COLOR
+from planner.recording.plots import Bundle
+from planner.recording.scene import boxes, ground_level, log_motion, log_mount, log_path, log_solids, log_surroundings
+from planner.recording.stream import log_markdown, log_png, save
+
+
+def write_link_recording(path: str | Path, design: LinkDesign) -> None:
+    """Writes a designed link on the boom along its first move, the joint's torque before and after, the picture and the report.
+
+    /world/boom/<link>/plates    the designed plates, in their own place and thickness, over the linkage's plain solids
+    /plots/torque/<link>         the joint's torque with the original link and the designed one
+    /picture                     contour, stress, convergence, torque and mass: see `link_picture`
+    /report                      the report as Markdown
+
+    Args:
+        path: the .rrd file.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    boom, trajectory, link = design.after, design.trajectories[0], design.link
+    before, after = (torque[: trajectory.t.size] for torque in design.torques)
+    joint = JOINTS[design.joint]
+    torque = Bundle(
+        f"plots/torque/{link.name}",
+        f"{joint} torque [Nm]",
+        ["original link [Nm]", "designed link [Nm]"],
+        [LIMIT_COLOR, COLORS[link.name]],
+        np.stack([before, after], axis=-1),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "link.png"
+        write_link_picture(picture, design)
+        image = picture.read_bytes()
+
+    def log(recording: rr.RecordingStream) -> None:
+        views = rrb.Tabs(
+            rrb.Spatial2DView(origin="/picture", name="Design"),
+            torque.view,
+            text("report", "Report"),
+            active_tab=0,
+        )
+        tip = forward_kinematics(boom, trajectory.q).position
+        view = scene("Boom [m]", eye_of(boom, trajectory.q), ground_level(boom, tip))
+        recording.send_blueprint(shown_beside(view, views, [2, 3]))
+        log_markdown(recording, "report", to_markdown(design))
+        log_png(recording, "picture", image)
+        log_mount(recording, trajectory.t, None)
+        log_solids(recording, boom, without=link.name)
+        log_motion(recording, boom, trajectory.t, trajectory.q)
+        log_surroundings(recording, boom, tip)
+        log_path(recording, "world/tip_path", tip, PAYLOAD_COLOR)
+        _log_plates(recording, design)
+        torque.log(recording, trajectory.t)
+
+    save(path, title(design), log)
+
+
+def _log_plates(recording: rr.RecordingStream, design: LinkDesign) -> None:
+    """The plates as boxes, a hundred along the link: a mesh would need normals, and a box shows its edges."""
+    link, beam = design.link, design.beam
+    edges = np.linspace(0.0, link.length, 101)
+    middle = (edges[1:] + edges[:-1]) / 2.0
+    half = np.interp(middle, beam.stations, design.heights) / 2.0
+    thickness = beam.width / beam.plates
+    across = np.linspace(-0.5, 0.5, beam.plates) * link.spacing if beam.plates > 1 else np.zeros(1)
+    centers = np.array([(x, 0.0, z) for z in across for x in middle])
+    if link.name == "extension":  # from its root to the wrist, where its frame stands
+        centers = (centers - [link.length, 0.0, 0.0]) * [-1.0, 1.0, 1.0]
+    sizes = np.tile(np.stack([np.diff(edges) / 2.0, half, np.full_like(half, thickness / 2.0)], axis=-1), (beam.plates, 1))
+    R = R_LINK_BODY[link.name]
+    low, high = (centers - sizes) @ R, (centers + sizes) @ R
+    recording.log(
+        f"world/boom/{link.name}/plates", boxes(low, high, COLORS[link.name]), rr.CoordinateFrame(link.name), static=True
+    )

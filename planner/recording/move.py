@@ -1,0 +1,126 @@
+"""A move as an instrument panel."""
+
+from pathlib import Path
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from boom_model import forward_kinematics
+from boom_model.reach import ReachMap
+from planner.drive_pictures import drive_picture
+from planner.planning import Move
+from planner.recording import drive_plots, joint_plots
+from planner.recording.arrows import arrow_scale, log_arrows
+from planner.recording.documents import assumptions_markdown, checks_markdown
+from planner.recording.layout import eye_of, grid, scene, shown_beside, text
+from planner.recording.legend import legend_view, log_legend
+from planner.recording.plots import Bundle, Plot
+from planner.recording.reach import boundary_sentence, log_boundary
+from planner.recording.scene import ground_level, log_motion, log_mount, log_solids, log_surroundings
+from planner.recording.stream import log_markdown, log_png, save
+from planner.recording.torque_ratio import legend, log_tip_path, torque_ratios, worst_ratio
+from planner.recording.torque_speed import log_plane, planes
+
+
+def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = None) -> None:
+    """Writes a move's recording with its blueprint; `boom view` or `rerun` shows it.
+
+    /world                    z up, the ground; frames hang from "tf#/world" [m]
+    /world/mount              frame "mount", which is frame 1 of the boom: tilt and heave of the vehicle, and its plate
+    /world/boom/<body>        its pose (frame "<body>" in "mount") over time, and its solid; likewise /world/boom/tip
+    /world/tip_path           the tip's whole path, static in "mount", its colour the worst drive's torque / limit
+    /world/loads/<arrow>      forces at pins 6, 7 and 8, force and moment on the mount; the scale is in the view's title
+    /world/ground, vehicle    for the eye, or /world/keep_out/<shape> where the boom's file gives shapes to keep away from
+    /world/reach              what the tip reaches, as a boundary in the arm's plane, where asked for
+    /legend                   what the path's colours mean
+    /plots/<quantity>/<joint> q, qd, qdd, tau over time, in deg and m, Nm and N; /plots/q/linkage is theta3 - theta2
+    /plots/ratio              torque / limit of each driven joint
+    /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle, which add up to tau
+    /plots/motor/<joint>      motor torque, what the torque-speed curve leaves, and that with the stepper's margin [Nm]
+    /plots/gearbox/<joint>    gearbox torque and its ratings [Nm]
+    /plots/margin/<joint>     margins of gearbox and motor [%]
+    /plots/tip/deflection     what the drives let the tip deflect, in parts and in all [mm]
+    /plots/pins               forces at the pins [N]
+    /plots/mount/force, moment   of the boom on the mount, along frame 1 [N, Nm]
+    .../limits                the limits beside a plot; those that do not change with the motion at the move's two ends only
+    /plane/<joint>            the motor's torque-speed plane, and in it /now, the operating point over time
+    /drives                   the page of `drive_pictures`, where a joint has a motor
+    /checks, /assumptions, /report   as Markdown
+
+    Args:
+        path: the .rrd file.
+        reach: what the tip reaches, drawn as a boundary that yaws with the boom; None draws none.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    boom, trajectory, loads, report = move.boom, move.trajectory, move.loads, move.report
+    ratios = torque_ratios(boom, trajectory, loads.tau)
+    torques: list[Plot | Bundle] = [*joint_plots.torque_plots(boom, trajectory, loads.tau), *joint_plots.ratio_bundles(ratios)]
+    joints = {
+        "Positions": joint_plots.position_plots(boom, trajectory),
+        "Velocities": joint_plots.velocity_plots(boom, trajectory),
+        "Accelerations": joint_plots.acceleration_plots(boom, trajectory),
+    }
+    parts, forces = list(joint_plots.part_bundles(move.parts)), list(joint_plots.load_bundles(boom.mount, loads))
+    drives = {
+        "Margins": list(drive_plots.margin_bundles(move)),
+        "Motors": list(drive_plots.motor_bundles(move)),
+        "Gearboxes": list(drive_plots.gearbox_bundles(move)),
+    }
+    driven = any(drives.values())
+    if driven:
+        drives["Tip"] = [drive_plots.tip_bundle(move)]
+    tip = forward_kinematics(boom, trajectory.q).position
+    bands = legend(known=bool(ratios))
+    motors, scale, worst = list(planes(move)), arrow_scale(loads), worst_ratio(ratios)
+
+    drive_tabs: list[rrb.View | rrb.Container] = [grid(name, tab) for name, tab in drives.items() if tab]
+    if motors:
+        drive_tabs.insert(0, rrb.Vertical(*(plane.view for plane in motors), name="Torque-speed"))
+    if driven:
+        drive_tabs.append(rrb.Spatial2DView(origin="/drives", name="Page"))
+    tabs: list[rrb.View | rrb.Container] = [
+        grid("Torques", torques),
+        rrb.Tabs(*(grid(name, tab) for name, tab in joints.items()), active_tab=0, name="Joints"),
+        grid("Torque parts", parts),
+        *([grid("Pins and mount", forces)] if forces else []),
+        *([rrb.Tabs(*drive_tabs, active_tab=0, name="Drives")] if drive_tabs else []),
+        text("checks", "Checks"),
+        text("assumptions", "Assumptions"),
+        text("report", "Report"),
+    ]
+    left = rrb.Vertical(
+        scene(
+            "; ".join(["Boom [m]", scale.sentence, *([] if reach is None else [boundary_sentence(reach)])]),
+            eye_of(boom, trajectory.q),
+            ground_level(boom, tip),
+        ),
+        legend_view("Path of the tip: torque / limit of the worst drive [-]"),
+        row_shares=[8, 1],
+    )
+
+    def log(recording: rr.RecordingStream) -> None:
+        recording.send_blueprint(shown_beside(left, rrb.Tabs(*tabs, active_tab=0), [1, 1]))
+        log_markdown(recording, "report", report.to_markdown())
+        log_markdown(recording, "checks", checks_markdown(report))
+        log_markdown(recording, "assumptions", assumptions_markdown(boom, report))
+        log_mount(recording, trajectory.t, move.vehicle)
+        log_solids(recording, boom)
+        log_motion(recording, boom, trajectory.t, trajectory.q)
+        log_surroundings(recording, boom, tip)
+        log_tip_path(recording, tip, worst)
+        log_legend(recording, bands)
+        log_arrows(recording, boom, trajectory.t, trajectory.q, loads, scale)
+        if reach is not None:
+            log_boundary(recording, reach)
+        for plot in (*torques, *(plot for tab in joints.values() for plot in tab)):
+            plot.log(recording, trajectory.t)
+        for bundle in (*parts, *forces, *(bundle for tab in drives.values() for bundle in tab)):
+            bundle.log(recording, trajectory.t)
+        for plane in motors:
+            log_plane(recording, trajectory.t, plane)
+        if driven:
+            log_png(recording, "drives", drive_picture(boom, trajectory, loads.tau, report))
+
+    save(path, f"{boom.name}: {report.profile}, {report.duration:.3f} s", log)

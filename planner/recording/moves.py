@@ -1,0 +1,112 @@
+"""Several moves in one recording: a boom of lines each, and their curves in shared plots."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import cycle
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from boom_model import InputError, forward_kinematics
+from planner.planning import Move
+from planner.recording import joint_plots
+from planner.recording.joint_plots import MOST_RATIO
+from planner.recording.layout import eye_of, scene, shown_beside, text
+from planner.recording.legend import legend_view, log_legend
+from planner.recording.palette import LIMIT_COLOR, MOVE_COLORS
+from planner.recording.plots import Plot, log_curves
+from planner.recording.scene import Place, ground_level, log_motion, log_mount, log_path, log_sticks, log_surroundings
+from planner.recording.stream import log_markdown, save
+from planner.recording.torque_ratio import torque_ratios, worst_ratio
+
+
+def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: str) -> None:
+    """Writes several moves by name over each other, each in its own colour, with their blueprint.
+
+    /world/moves/<name>/<body>   its pose (frame "<name> <body>" in "mount") over time, and its links as lines
+    /world/moves/<name>/tip_path its tip's whole path
+    /plots/<quantity>/<joint>/<name>   q, qd, qdd, tau over time; the joint limits beside them in .../limits
+    /plots/ratio/<name>          torque / limit of the worst drive
+    /legend                      the moves' colours
+    /reading                     what is compared, as Markdown
+
+    Each keeps its end pose once it is there. The mount rests: moves on a vehicle are refused.
+
+    Args:
+        path: the .rrd file.
+        moves: by name.
+        reading: Markdown.
+
+    Raises:
+        InputError: no move is given, one is on a vehicle, or the file cannot be written; an old one is left as it was.
+    """
+    if not moves:
+        raise InputError("no move to record")
+    if any(move.vehicle is not None for move in moves.values()):
+        raise InputError("moves on a vehicle cannot share a mount: record each by itself")
+    longest = max(moves.values(), key=lambda move: move.trajectory.duration)
+    colors = dict(zip(moves, cycle(MOVE_COLORS), strict=False))
+    legend = [*colors.items(), ("limit", LIMIT_COLOR)]
+    tips = {name: forward_kinematics(move.boom, move.trajectory.q).position for name, move in moves.items()}
+    reached = np.concatenate(list(tips.values()))
+    shared = _tabs(longest)
+    known = {name: worst_ratio(torque_ratios(m.boom, m.trajectory, m.loads.tau)) for name, m in moves.items()}
+    ratios = {name: np.minimum(ratio, MOST_RATIO) for name, ratio in known.items() if ratio is not None}
+
+    def log(recording: rr.RecordingStream) -> None:
+        tabs: list[rrb.View | rrb.Container] = [_grid(name, tab) for name, tab in shared.items()]
+        ratio = rrb.TimeSeriesView(origin="/plots/ratio", name=f"torque / limit of the worst drive, up to {MOST_RATIO:g} [-]")
+        if ratios:
+            tabs.insert(0, rrb.Vertical(ratio, name="Torque / limit"))
+        right = rrb.Tabs(*tabs, text("reading", "Reading"), active_tab=0)
+        view = scene(
+            "Booms [m]",
+            eye_of(longest.boom, *(move.trajectory.q for move in moves.values())),
+            ground_level(longest.boom, reached),
+        )
+        left = rrb.Vertical(view, legend_view("Colours"), row_shares=[8, 1])
+        recording.send_blueprint(shown_beside(left, right, [1, 1]))
+        log_legend(recording, legend)
+        log_markdown(recording, "reading", reading)
+        log_mount(recording, longest.trajectory.t, None)
+        log_surroundings(recording, longest.boom, reached)
+        for tab in shared.values():
+            for plot in tab:
+                plot.log_limits(recording, longest.trajectory.t)
+        for name, move in moves.items():
+            t, color = move.trajectory.t, colors[name]
+            place = Place(rr.new_entity_path(["world", "moves", name]).lstrip("/"), f"{name} ")
+            log_sticks(recording, move.boom, place, color)
+            log_motion(recording, move.boom, t, move.trajectory.q, place)
+            log_path(recording, place.of("tip_path"), tips[name], color)
+            for plot in (plot for tab in _tabs(move).values() for plot in tab):
+                entity = f"{plot.entity}{rr.new_entity_path([name])}"
+                log_curves(recording, entity, t, [f"{name} [{plot.unit}]"], [color], plot.values[:, None])
+            if name in ratios:
+                log_curves(recording, f"plots/ratio{rr.new_entity_path([name])}", t, [name], [color], ratios[name][:, None])
+        ends = np.unique(longest.trajectory.t[[0, -1]])
+        if ratios:
+            log_curves(recording, "plots/ratio/limit", ends, ["limit"], [LIMIT_COLOR], np.ones((len(ends), 1)))
+
+    save(path, f"{longest.boom.name}: {', '.join(moves)}", log)
+
+
+def _grid(name: str, plots: list[Plot]) -> rrb.Grid:
+    """Without the legends of the views, which would cover the curves: one stands below the scene."""
+    no_legend = rrb.PlotLegend(visible=False)
+    views = [rrb.TimeSeriesView(origin=f"/{plot.entity}", name=plot.title, plot_legend=no_legend) for plot in plots]
+    return rrb.Grid(*views, grid_columns=2, name=name)
+
+
+def _tabs(move: Move) -> dict[str, list[Plot]]:
+    """The plots that moves share. The drives' limits are left out: they go with each move's own speed."""
+    boom, trajectory = move.boom, move.trajectory
+    torques = joint_plots.torque_plots(boom, trajectory, move.loads.tau)
+    return {
+        "Torques": [replace(plot, limits={}) for plot in torques],
+        "Positions": joint_plots.position_plots(boom, trajectory),
+        "Velocities": joint_plots.velocity_plots(boom, trajectory),
+        "Accelerations": joint_plots.acceleration_plots(boom, trajectory),
+    }

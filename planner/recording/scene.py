@@ -1,0 +1,213 @@
+"""The linkage in 3D: its bodies' solids and poses, what it stands on, and what it keeps away from."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import rerun as rr
+from scipy.spatial.transform import Rotation
+
+from boom_model import Boom, body_transforms
+from boom_model.arrays import Array
+from boom_model.frames import R_LINK_BODY
+from boom_model.keep_out import Box, KeepOut
+from planner.recording.palette import COLORS, DARK, GREY, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, PIN_COLOR, Color
+from planner.recording.stream import time_column
+from planner.vehicle import VehicleCase, base_pose
+
+POSES_AT_ONCE = 20_000
+"""Samples whose poses are in memory together; each takes some 3 kB there, and 0.5 kB in the file."""
+
+FOR_THE_EYE = "Ground and vehicle are drawn for the eye: the boom's file describes neither."
+
+_STEEL = 7850.0  # [kg/m^3]: the payload is shown as a ball of steel
+_GROUND, _BELOW_TIP = 1.0, 0.25  # [m]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a boom stands among the entities and frames; the first one's frames have its bodies' bare names."""
+
+    entity: str = "world/boom"
+    prefix: str = ""
+
+    def of(self, body: str) -> str:
+        """The entity of a body."""
+        return f"{self.entity}/{body}"
+
+    def frame(self, body: str) -> str:
+        """The frame of a body."""
+        return f"{self.prefix}{body}"
+
+
+BOOM = Place()
+PLANNED = Place("world/planned", "planned ")
+
+
+def log_mount(recording: rr.RecordingStream, t: Array, vehicle: VehicleCase | None) -> None:
+    """Frame "mount", which is frame 1 of the boom, with its plate, as the vehicle tilts and heaves it."""
+    recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    plate = boxes(np.array([[-0.2, -0.2, -0.02]]), np.array([[0.2, 0.2, 0.0]]), PIN_COLOR)
+    recording.log("world/mount", plate, rr.CoordinateFrame("mount"), static=True)
+    T = np.eye(4)[None] if vehicle is None else base_pose(vehicle, t)
+    _log_poses(recording, "world/mount", T, "tf#/world", "mount", t[: len(T)])
+
+
+def log_motion(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, place: Place = BOOM) -> None:
+    """The pose of every body and of the tip in "mount", at times t (n,) [s] of positions q (n, 5)."""
+    for start in range(0, len(t), POSES_AT_ONCE):
+        part = slice(start, start + POSES_AT_ONCE)
+        for name, T in body_transforms(boom, q[part]).items():
+            _log_poses(recording, place.of(name), T, "mount", place.frame(name), t[part])
+
+
+def _log_poses(recording: rr.RecordingStream, entity: str, T: Array, parent: str, child: str, t: Array) -> None:
+    motion = rr.Transform3D.columns(
+        translation=T[:, :3, 3],
+        quaternion=Rotation.from_matrix(T[:, :3, :3]).as_quat(),
+        parent_frame=[parent] * len(t),
+        child_frame=[child] * len(t),
+    )
+    recording.send_columns(entity, [time_column(t)], motion)
+
+
+def log_path(recording: rr.RecordingStream, entity: str, positions: Array, color: Color) -> None:
+    """A path of the tip (n, 3) [m] in "mount", in one colour."""
+    strip = rr.LineStrips3D([positions], colors=[color], radii=[0.004])
+    recording.log(entity, strip, rr.CoordinateFrame("mount"), static=True)
+
+
+def log_solids(recording: rr.RecordingStream, boom: Boom, *, without: str | None = None) -> None:
+    """The solids of the boom: links but the one `without`, pins, payload."""
+    for name, bars in _bars(boom).items():
+        if name == without:
+            continue
+        _log_bars(recording, BOOM, name, bars, COLORS[name], "solid")
+    for name, along in _pins(boom).items():
+        centers = np.array([(e, 0.0, 0.0) for e in along]) @ R_LINK_BODY[name]
+        # A cylinder lies along z, and these bodies' z is the pins' direction n.
+        pins = rr.Cylinders3D(centers=centers, lengths=0.16, radii=0.018, colors=PIN_COLOR, fill_mode="solid")
+        recording.log(BOOM.of(f"{name}/pins"), pins, rr.CoordinateFrame(name), static=True)
+    if boom.payload.mass > 0.0:
+        radius = (boom.payload.mass / _STEEL * 0.75 / np.pi) ** (1.0 / 3.0)
+        ball = rr.Points3D([(0.0, 0.0, 0.0)], radii=radius, colors=PAYLOAD_COLOR)
+        recording.log(BOOM.of("tip"), ball, rr.CoordinateFrame("tip"), static=True)
+
+
+def log_edges(recording: rr.RecordingStream, boom: Boom, place: Place, color: Color = LIMIT_COLOR) -> None:
+    """The links' edges alone, of a boom beside another."""
+    for name, bars in _bars(boom).items():
+        _log_bars(recording, place, name, bars, color, "majorwireframe")
+
+
+def log_sticks(recording: rr.RecordingStream, boom: Boom, place: Place, color: Color) -> None:
+    """The links as lines in one colour, of a boom among others."""
+    for name, bars in _bars(boom).items():
+        R = R_LINK_BODY[name]
+        lines = [np.array([(bar.e[0], p, 0.0), (bar.e[1], p, 0.0)]) @ R for bar in bars for p in (sum(bar.p) / 2.0,)]
+        if name in ("base", "end_effector"):  # these are upright
+            (bar,) = bars
+            lines = [np.array([(0.0, bar.p[0], 0.0), (0.0, bar.p[1], 0.0)]) @ R]
+        strips = rr.LineStrips3D(lines, colors=[color], radii=[0.012])
+        recording.log(place.of(name), strips, rr.CoordinateFrame(place.frame(name)), static=True)
+
+
+def ground_level(boom: Boom, tip: Array) -> float:
+    """Height [m] at which ground is drawn where the boom's file gives none: below all positions (n, 3) of the tip."""
+    return 0.0 if boom.keep_out is not None else min(-_GROUND, float(tip[:, 2].min()) - _BELOW_TIP)
+
+
+def log_surroundings(recording: rr.RecordingStream, boom: Boom, tip: Array) -> None:
+    """The shapes to keep away from; where none are given, ground and vehicle for the eye, below all positions of the tip."""
+    if boom.keep_out is not None:
+        _log_keep_out(recording, boom.keep_out)
+        return
+    ground = ground_level(boom, tip)
+    label = "drawn for the eye"
+    plane = rr.Boxes3D(
+        centers=[(0.0, 0.0, ground - 0.01)], half_sizes=[(3.0, 3.0, 0.01)], colors=[(*DARK, 60)], fill_mode="solid",
+        labels=[f"ground, {label}"], show_labels=False,
+    )  # fmt: skip
+    recording.log("world/ground", plane, static=True)
+    low, high = np.array([-2.4, -0.8, ground + 0.35]), np.array([0.25, 0.8, -0.02])
+    body = rr.Boxes3D(
+        centers=[(low + high) / 2.0], half_sizes=[(high - low) / 2.0], colors=[GREY], fill_mode="majorwireframe",
+        labels=[f"vehicle, {label}"], show_labels=True,
+    )  # fmt: skip
+    recording.log("world/vehicle", body, rr.CoordinateFrame("mount"), static=True)
+
+
+def _log_keep_out(recording: rr.RecordingStream, keep_out: KeepOut) -> None:
+    """The shapes that the arm keeps away from, as the mount carries them."""
+    look: dict[str, Any] = {"colors": [OUTSIDE_COLOR], "fill_mode": "majorwireframe"}
+    for shape in keep_out.shapes:
+        entity = rr.new_entity_path(["world", "keep_out", shape.name])
+        if isinstance(shape, Box):
+            solid: Any = rr.Boxes3D(centers=[shape.center], sizes=[shape.size], labels=[shape.name], **look)
+        else:
+            axis = shape.end - shape.start
+            turn, _ = Rotation.align_vectors([axis], [(0.0, 0.0, 1.0)]) if axis.any() else (Rotation.identity(), 0.0)
+            solid = rr.Capsules3D(
+                lengths=[float(np.linalg.norm(axis))],
+                radii=[shape.radius],
+                translations=[shape.start],
+                quaternions=[turn.as_quat()],
+                labels=[shape.name],
+                **look,
+            )
+        recording.log(entity, solid, rr.CoordinateFrame("mount"), static=True)
+
+
+def boxes(low: Array, high: Array, color: Color, fill: Literal["solid", "majorwireframe"] = "solid") -> rr.Boxes3D:
+    """Boxes between opposite corners, (boxes, 3) each."""
+    return rr.Boxes3D(centers=(low + high) / 2.0, half_sizes=np.abs(high - low) / 2.0, colors=color, fill_mode=fill)
+
+
+@dataclass(frozen=True)
+class _Bar:
+    """A box in a link's axes (e, p, n): from e[0] to e[1] along the link, p[0] to p[1] across it, depth along the pins [m]."""
+
+    e: tuple[float, float]
+    p: tuple[float, float]
+    depth: float
+
+    def low(self) -> tuple[float, float, float]:
+        return self.e[0], self.p[0], -self.depth / 2.0
+
+    def high(self) -> tuple[float, float, float]:
+        return self.e[1], self.p[1], self.depth / 2.0
+
+
+def _log_bars(
+    recording: rr.RecordingStream,
+    place: Place,
+    body: str,
+    bars: list[_Bar],
+    color: Color,
+    fill: Literal["solid", "majorwireframe"],
+) -> None:
+    low, high = (np.array([corner(bar) for bar in bars]) @ R_LINK_BODY[body] for corner in (_Bar.low, _Bar.high))
+    recording.log(place.of(body), boxes(low, high, color, fill), rr.CoordinateFrame(place.frame(body)), static=True)
+
+
+def _bars(boom: Boom) -> dict[str, list[_Bar]]:
+    """The solids of every body. The extension is a rod: `grip` of it shows when retracted, and stays inside at full stroke."""
+    g, grip = boom.geometry, 0.05
+    rod = max(float(boom.limits.upper[3]) + 2.0 * grip, g.L7)
+    return {
+        "base": [_Bar((-0.09, 0.09), (0.0, g.L1 - 0.025), 0.18)],
+        "lower": [_Bar((0.0, g.L3), (-0.025, 0.025), 0.10)],
+        "inner": [_Bar((0.0, g.L9), (-0.025, 0.025), 0.06)],
+        "outer": [_Bar((0.0, g.L4), (-0.02, 0.02), 0.05)],
+        "upper": [
+            _Bar((0.0, g.L5), (-0.025, 0.025), 0.10),
+            _Bar((-g.L7 + grip, rod - g.L7), (-g.L6 - 0.03, -g.L6 + 0.03), 0.08),
+        ],
+        "extension": [_Bar((0.0, rod), (-0.018, 0.018), 0.04)],
+        "end_effector": [_Bar((-0.025, 0.025), (-0.025, g.L8), 0.14)],
+    }
+
+
+def _pins(boom: Boom) -> dict[str, tuple[float, ...]]:
+    """How far along its link each pin sits [m]: shoulder and 6, 8 and 7, wrist."""
+    return {"lower": (0.0, boom.geometry.L3), "upper": (0.0, boom.geometry.L5), "end_effector": (0.0,)}
