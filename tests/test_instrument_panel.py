@@ -305,7 +305,7 @@ def test_every_view_says_its_unit(panel: Read):
 
 @pytest.fixture(scope="module")
 def moves() -> dict[str, Move]:
-    return profile_moves(BOOM, "transport", "phenotyping", step=0.05)
+    return profile_moves(BOOM, "transport", "phenotyping", step=0.05)[0]
 
 
 @pytest.fixture(scope="module")
