@@ -4,7 +4,8 @@ import io
 import shlex
 import sys
 from base64 import b64encode
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 FORMS = (".md", ".html", ".pdf")
 _TEXT = 8  # [pt]
+_PADDING = 0.6  # [mm]
+_WITH_HEADING = 25.0  # [mm], what stands on the page of a heading at least
 _LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "control", "coal")
 _STYLE = (
     "body{font-family:sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
@@ -56,20 +59,22 @@ def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figu
     drawn = {title: _png(figure) for title, figure in pictures.items()}
     versions = ", ".join(f"{name} {version(name)}" for name in ("boom", *_LIBRARIES))
     made = f"Made by `{command_line()}` with {versions}, Python {sys.version.split()[0]}."
-    if path.suffix == ".md":
-        content = f"{markdown.rstrip()}\n"
-        for k, (title, png) in enumerate(drawn.items(), start=1):
-            beside = path.with_name(f"{path.stem}-{k}.png")
-            with replacing(beside) as temporary:
-                Path(temporary).write_bytes(png)
-            content += f"\n## {title}\n\n![{title}]({beside.name})\n"
-        data = f"{content}\n---\n\n{made}\n".encode()
-    elif path.suffix == ".html":
-        data = _html(path.stem, markdown, drawn, made).encode()
-    else:
-        data = _pdf(markdown, drawn, made)
-    with replacing(path) as temporary:
-        Path(temporary).write_bytes(data)
+    with ExitStack() as moved:  # every file is whole before the first takes its place
+
+        def write(place: Path, data: bytes) -> None:
+            Path(moved.enter_context(replacing(place))).write_bytes(data)
+
+        if path.suffix == ".md":
+            content = f"{markdown.rstrip()}\n"
+            for k, (title, png) in enumerate(drawn.items(), start=1):
+                beside = path.with_name(f"{path.stem}-{k}.png")
+                write(beside, png)
+                content += f"\n## {title}\n\n![{title}]({beside.name})\n"
+            write(path, f"{content}\n---\n\n{made}\n".encode())
+        elif path.suffix == ".html":
+            write(path, _html(path.stem, markdown, drawn, made).encode())
+        else:
+            write(path, _pdf(markdown, drawn, made))
 
 
 def _html(title: str, markdown: str, drawn: Mapping[str, bytes], made: str) -> str:
@@ -96,15 +101,19 @@ def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str) -> bytes:
     pdf.add_page()
     for node in SyntaxTreeNode(MarkdownIt("commonmark").enable("table").parse(f"{markdown}\n\n{made}\n")).children:
         if node.type == "table":
+            pdf.ln(2)
             _set_table(pdf, [[_text(cell) for cell in row.children] for part in node.children for row in part.children])
         elif node.type == "heading":
             size = _TEXT + (5 if node.tag == "h1" else 3)
             pdf.ln(3)
+            if pdf.will_page_break(_WITH_HEADING):
+                pdf.add_page()
             pdf.set_font("helvetica", "B", size)
             pdf.multi_cell(0, size / 2, _text(node), align="L", new_x="LMARGIN", new_y="NEXT")
             pdf.set_font("helvetica", size=_TEXT)
             pdf.ln(1)
         else:
+            pdf.ln(1)
             for line in node.children if node.type == "bullet_list" else [node]:
                 pdf.multi_cell(0, _TEXT / 2, ("- " if node.type == "bullet_list" else "") + _text(line), align="L",
                                new_x="LMARGIN", new_y="NEXT")  # fmt: skip
@@ -117,15 +126,44 @@ def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str) -> bytes:
 
 
 def _set_table(pdf: "FPDF", rows: list[list[str]]) -> None:
-    """A table whose columns are as wide as their longest word asks for, and beyond that as their text."""
+    """A table no wider than the page: every column holds its longest word, and only the widest have to break their text."""
+    size = float(_TEXT - 1)
+    pdf.set_font("helvetica", "B", size)  # the header's, in which words are widest
+    around = 2.0 * _PADDING + 0.5
+
+    def widest(texts: Iterable[str]) -> float:
+        return max(map(pdf.get_string_width, texts), default=0.0) + around
+
     columns = list(zip(*rows, strict=True))
-    longest = [max(len(word) for cell in column for word in cell.split() or [""]) for column in columns]
-    mean = [sum(map(len, column)) / len(column) for column in columns]
-    widths = [least + average for least, average in zip(longest, mean, strict=True)]
-    pdf.set_font("helvetica", size=_TEXT - 1)
-    with pdf.table(rows, col_widths=widths, text_align="LEFT", line_height=_TEXT / 2.2, padding=0.6):
+    least = [widest(word for cell in column for word in cell.split()) for column in columns]
+    whole = [widest(column) for column in columns]
+    shrink = min(1.0, pdf.epw / sum(least))
+    widths = _capped([x * shrink for x in least], [x * shrink for x in whole], pdf.epw)
+    pdf.set_font("helvetica", size=size * shrink)
+    with pdf.table(
+        rows,
+        width=min(sum(widths), pdf.epw),
+        col_widths=widths,
+        align="LEFT",
+        text_align="LEFT",
+        line_height=0.55 * size * shrink,
+        padding=_PADDING,
+    ):
         pass
     pdf.set_font("helvetica", size=_TEXT)
+    pdf.ln(2)
+
+
+def _capped(least: list[float], whole: list[float], room: float) -> list[float]:
+    """The whole widths, those beyond a common cap cut down to it but to no less than the least, so that all fit the room."""
+    low, high = 0.0, max(whole)
+    if sum(whole) <= room:
+        return whole
+    for _ in range(40):
+        cap = (low + high) / 2.0
+        fits = sum(max(few, min(all_, cap)) for few, all_ in zip(least, whole, strict=True)) <= room
+        low, high = (cap, high) if fits else (low, cap)
+    return [max(few, min(all_, low)) for few, all_ in zip(least, whole, strict=True)]
 
 
 def _text(node: "SyntaxTreeNode") -> str:

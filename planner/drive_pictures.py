@@ -28,6 +28,8 @@ COLORS = {  # Okabe and Ito's, which the colour-blind can tell apart
 }
 _THERE, _BACK, _CURVE = "#0072b2", "#56b4e9", "#000000"
 _LONGEST_BAR = 3.0
+_WIDTHS = (1.0, 1.0, 0.22, 0.9)
+"""Of the three panels; the names of the bars stand in the third column."""
 _RPM = 30.0 / np.pi
 
 
@@ -68,30 +70,70 @@ def drive_figure(boom: Boom, trajectory: Trajectory, tau: Array, report: Report,
     Raises:
         InputError: no joint has a motor.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    driven = [(i, drive) for i, drive in enumerate(boom.drives) if drive is not None]
+    driven = _driven(boom)
     if not driven:
         raise InputError(f"{boom.name} has no motor to show")
-    figure = Figure(figsize=(18.0, 6.0 * len(driven) + 4.2), dpi=90)
-    FigureCanvasAgg(figure)
-    high = figure.get_figheight()
+    high = 6.0 * len(driven) + 4.2
+    figure = _figure(18.0, high)
     ratios = [1.0] * len(driven) + [0.5]
     margin = {"left": 0.04, "right": 0.985, "bottom": 0.85 / high, "top": 1.0 - 0.75 / high}
-    widths = (1.0, 1.0, 0.22, 0.9)  # the names of the bars stand in the third
-    grid = figure.add_gridspec(len(ratios), 4, height_ratios=ratios, width_ratios=widths, wspace=0.2, hspace=0.36, **margin)
+    grid = figure.add_gridspec(len(ratios), 4, height_ratios=ratios, width_ratios=_WIDTHS, wspace=0.2, hspace=0.4, **margin)
     shown = list(parts) or [slice(0, len(trajectory.t))]
     for k, (i, drive) in enumerate(driven):
-        plane, gearbox, margins = (figure.add_subplot(grid[k, column]) for column in (0, 1, 3))
-        rows = [row for row in report.rows if row.joint == JOINTS[i] and row.check.startswith(("gearbox", "motor"))]
-        _plane(plane, drive, JOINTS[i], tau[:, i], trajectory.qd[:, i], trajectory.qdd[:, i], rows)
-        _gearbox(gearbox, drive, JOINTS[i], trajectory.t, tau[:, i], shown, rows)
-        _margins(margins, JOINTS[i], rows)
+        panels = [figure.add_subplot(grid[k, column]) for column in (0, 1, 3)]
+        _drive(panels, i, drive, trajectory, tau, report, shown)
     _tip(figure.add_subplot(grid[-1, :]), boom, trajectory, tau, shown)
     title = f"{boom.name}, payload {boom.payload.mass:g} kg: {report.profile}, {report.duration:.3f} s: {report.verdict}"
     figure.suptitle(title, y=1.0 - 0.15 / high, va="top")
     return figure
+
+
+def drive_pages(
+    boom: Boom, trajectory: Trajectory, tau: Array, report: Report, parts: Sequence[slice] = ()
+) -> dict[str, "Figure"]:
+    """The same as a figure for each joint that has a motor, and one for the tip, by title; none where no joint has one."""
+    shown, driven = list(parts) or [slice(0, len(trajectory.t))], _driven(boom)
+    pages = {}
+    for i, drive in driven:
+        figure = pages[f"Drive of {JOINTS[i]}"] = _figure(15.5, 9.6)
+        grid = figure.add_gridspec(1, 4, width_ratios=_WIDTHS, wspace=0.22, left=0.05, right=0.985, bottom=0.18, top=0.95)
+        panels = [figure.add_subplot(grid[0, column]) for column in (0, 1, 3)]
+        _drive(panels, i, drive, trajectory, tau, report, shown)
+    if driven:
+        figure = pages["Tip"] = _figure(12.0, 7.4)
+        axes = figure.add_subplot()
+        figure.subplots_adjust(left=0.06, right=0.985, bottom=0.2, top=0.95)
+        _tip(axes, boom, trajectory, tau, shown)
+    return pages
+
+
+def _driven(boom: Boom) -> list[tuple[int, Drive]]:
+    return [(i, drive) for i, drive in enumerate(boom.drives) if drive is not None]
+
+
+def _figure(width: float, height: float) -> "Figure":
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=90)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _drive(
+    panels: "Sequence[Axes]",
+    i: int,
+    drive: Drive,
+    trajectory: Trajectory,
+    tau: Array,
+    report: Report,
+    shown: Sequence[slice],
+) -> None:
+    plane, gearbox, margins = panels
+    rows = [row for row in report.rows if row.joint == JOINTS[i] and row.check.startswith(("gearbox", "motor"))]
+    _plane(plane, drive, JOINTS[i], tau[:, i], trajectory.qd[:, i], trajectory.qdd[:, i], rows)
+    _gearbox(gearbox, drive, JOINTS[i], trajectory.t, tau[:, i], shown, rows)
+    _margins(margins, JOINTS[i], rows)
 
 
 def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: Array, rows: Sequence[Row]) -> None:
@@ -122,7 +164,7 @@ def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: A
     axes.set_xlim(0.0, fastest * _RPM)
     axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.25)
-    _legend_below(axes, 2)
+    _legend_below(axes, 1)
 
 
 def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts: Sequence[slice], rows: Sequence[Row]) -> None:
@@ -141,7 +183,7 @@ def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts
         axes.axhline(average, color=_CURVE, linestyle="--", label=f"average of the cycle {average:.0f} Nm")
     axes.set(title=f"{joint}: {gear.name}", ylabel="gearbox torque, size [Nm]")
     axes.set_ylim(bottom=0.0)
-    _legend_below(axes, 3)
+    _legend_below(axes, 2)
 
 
 def _tip(axes: "Axes", boom: Boom, trajectory: Trajectory, tau: Array, parts: Sequence[slice]) -> None:

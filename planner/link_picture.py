@@ -1,5 +1,6 @@
 """A link's design as a picture: contour, stress, convergence, original against designed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -8,12 +9,13 @@ import numpy as np
 from boom_model.arrays import Array
 from boom_model.link_design import internal_forces, von_mises
 from planner.files import replacing
+from planner.link_convergence import PLACES, study
 from planner.link_report import title
 from planner.links import LinkDesign
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-from planner.link_convergence import PLACES, study
+    from matplotlib.figure import Figure
 
 _BLUE, _ORANGE, _GREEN, _PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 
@@ -24,13 +26,36 @@ def write_link_picture(path: str | Path, design: LinkDesign) -> None:
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
     """
+    figure = _figure(14.0, 17.0)
+    panels = figure.subplots(4, 2)
+    figure.suptitle(title(design), fontsize=11)
+    _draw_design(design, panels[[0, 0, 3, 3], [0, 1, 0, 1]])
+    _draw_convergence(design, panels[[1, 1, 2, 2], [0, 1, 0, 1]])
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def link_pictures(design: LinkDesign) -> dict[str, "Figure"]:
+    """The same in two figures, by title."""
+    found = {}
+    for name, draw in (("Design", _draw_design), ("Convergence", _draw_convergence)):
+        found[name] = _figure(11.0, 7.2)
+        draw(design, found[name].subplots(2, 2).ravel())
+    return found
+
+
+def _figure(width: float, height: float) -> "Figure":
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(14.0, 17.0), dpi=120, layout="constrained")
+    figure = Figure(figsize=(width, height), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    ((contour, stress), (slices, steps), (elements, places), (torque, bars)) = figure.subplots(4, 2)
-    figure.suptitle(title(design), fontsize=11)
+    return figure
+
+
+def _draw_design(design: LinkDesign, panels: "Sequence[Axes]") -> None:
+    """Contour, stress, torque and mass."""
+    contour, stress, torque, bars = panels
     x = design.beam.stations
     for H, name, color in ((design.heights, "design", _BLUE), (design.stress_heights, "stress only", _ORANGE)):
         contour.fill_between(x, 500.0 * H, -500.0 * H, color=color, alpha=0.35 if name == "design" else 0.6, label=name)
@@ -41,6 +66,23 @@ def write_link_picture(path: str | Path, design: LinkDesign) -> None:
     stress.plot(x, 1e-6 * only.max(axis=0), color=_ORANGE, linewidth=1.0, label="stress only")
     stress.axhline(1e-6 * design.limits.stress, color="black", linestyle="--", linewidth=1.0, label="limit")
     stress.set(title="Largest von Mises stress", xlabel="x from the root [m]", ylabel="[MPa]", ylim=(0.0, None))
+    t = np.concatenate([each.t for each in design.trajectories])
+    for values, name, color in zip(design.torques, ("original link", "designed link"), (_ORANGE, _BLUE), strict=True):
+        torque.plot(*_broken_between_moves(design, t, values), color=color, label=name)
+    torque.set(title="Torque of the link's joint along the moves", xlabel="t [s]", ylabel="[Nm]")
+    masses = [design.before.bodies[design.link.name].mass, design.body.mass]
+    fittings = 0.0 if design.link.fittings is None else design.link.fittings.mass
+    bars.bar(["original", "designed"], masses, color=[_ORANGE, _BLUE], width=0.5)
+    bars.bar(["designed"], [fittings], color="grey", width=0.5, label="of which fittings (kept)")
+    for i, value in enumerate(masses):
+        bars.text(i, value, f"{value:.2f} kg", ha="center", va="bottom")
+    bars.set(title="Mass of the whole link", ylabel="[kg]", ylim=(0.0, 1.15 * max(masses)))
+    _finish(panels)
+
+
+def _draw_convergence(design: LinkDesign, panels: "Sequence[Axes]") -> None:
+    """Mass by slices and by delta-H, deflection and stress by elements."""
+    slices, steps, elements, places = panels
     found = study(design)
     slices.plot(found.slices[:, 0], found.slices[:, 1], marker="o", color=_BLUE, label="plates")
     slices.set(title="Mass by number of slices", xlabel="slices", ylabel="[kg]")
@@ -61,23 +103,14 @@ def write_link_picture(path: str | Path, design: LinkDesign) -> None:
     else:
         for place, curve in zip(PLACES, found.stresses.T[1:], strict=True):
             places.semilogx(found.stresses[:, 0], 1e-6 * curve, marker=".", label=f"x = {place * design.link.length:.3g} m")
-    t = np.concatenate([each.t for each in design.trajectories])
-    for values, name, color in zip(design.torques, ("original link", "designed link"), (_ORANGE, _BLUE), strict=True):
-        torque.plot(*_broken_between_moves(design, t, values), color=color, label=name)
-    torque.set(title="Torque of the link's joint along the moves", xlabel="t [s]", ylabel="[Nm]")
-    masses = [design.before.bodies[design.link.name].mass, design.body.mass]
-    fittings = 0.0 if design.link.fittings is None else design.link.fittings.mass
-    bars.bar(["original", "designed"], masses, color=[_ORANGE, _BLUE], width=0.5)
-    bars.bar(["designed"], [fittings], color="grey", width=0.5, label="of which fittings (kept)")
-    for i, value in enumerate(masses):
-        bars.text(i, value, f"{value:.2f} kg", ha="center", va="bottom")
-    bars.set(title="Mass of the whole link", ylabel="[kg]", ylim=(0.0, 1.15 * max(masses)))
-    for axes in (contour, stress, slices, steps, elements, places, torque, bars):
+    _finish(panels)
+
+
+def _finish(panels: "Sequence[Axes]") -> None:
+    for axes in panels:
         axes.grid(alpha=0.25)
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize=8)
-    with replacing(path) as temporary:
-        figure.savefig(temporary, format="png")
 
 
 def _say(axes: "Axes", text: str) -> None:

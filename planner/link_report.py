@@ -8,6 +8,8 @@ import numpy as np
 from boom_model import JOINTS
 from planner.link_convergence import PLACES, Convergence
 from planner.links import LinkDesign
+from planner.markdown import section, table
+from planner.report import assumptions
 
 
 def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:
@@ -180,9 +182,9 @@ def to_markdown(design: LinkDesign) -> str:
     lines = [f"# {title(design)}", "", *(f"- {text}" for text in sentences(design)), ""]
     for header, body in ((ROWS_HEADER, rows(design)), (MOTORS_HEADER, motor_rows(design))):
         if body:
-            lines += ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header)]
-            lines += ["| " + " | ".join(row) + " |" for row in body] + [""]
-    return "\n".join([*lines, "## Notes", "", *(f"- {note}" for note in design.notes)]) + "\n"
+            lines += [*table(header, body), ""]
+    assumed = assumptions(design.before, any(motion.qddd is not None for motion in design.trajectories))
+    return "\n".join([*lines[:-1], *section("Notes", design.notes), *section("Assumed", assumed)]) + "\n"
 
 
 def title(design: LinkDesign) -> str:

@@ -37,6 +37,7 @@ from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
 from planner.link_loads import largest_components, link_cases, thesis_load
 from planner.planning import check, plan, plan_each_profile
 from planner.rows import Verdict
+from planner.tracking import Track
 from planner.trajectory import Trajectory
 
 E = TypeVar("E", bound=StrEnum)
@@ -267,15 +268,18 @@ def design_link(boom: Boom, task: LinkTask, trajectories: Sequence[Trajectory]) 
     )
 
 
-def default_moves(boom: Boom, task: LinkTask) -> list[Trajectory]:
+def default_moves(boom: Boom, task: LinkTask, track: Track = iter) -> list[Trajectory]:
     """Transport to phenotyping: with every profile in its least time, or the thesis's cubic of 5 s where its load is taken.
+
+    Args:
+        track: iterates over the profiles, and may show how far it is.
 
     Raises:
         InputError, InfeasibleError: as `plan`.
     """
     if task.load == LoadFrom.THESIS:
         return [plan(boom, "transport", "phenotyping", duration=5.0).trajectory]
-    return plan_each_profile(boom, "transport", "phenotyping")
+    return plan_each_profile(boom, "transport", "phenotyping", track)
 
 
 def thesis_buckling(link: Link, beam: Beam, heights: Array) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.resources import files
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -24,6 +25,7 @@ from planner.planning import CHECKS_PER_STEP, check
 from planner.report import Report
 from planner.targets import TipTarget, parse_along, parse_hold, parse_pitch, parse_target, resolve
 from planner.timing import Timing, timed
+from planner.tracking import Track
 from planner.trajectory import STEP, Trajectory, joined, sample
 from planner.vehicle import VehicleCase
 
@@ -98,6 +100,11 @@ class Mission:
         """[m]"""
         tolerance = self.table.tip_tolerance_mm
         return None if tolerance is None else Sourced(tolerance * 1e-3, self.origin)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """The mission itself, where it is assumed."""
+        return (f"the mission: {self.origin.source}",) if self.origin.basis is Basis.ASSUMED else ()
 
 
 def named_missions() -> tuple[str, ...]:
@@ -191,6 +198,11 @@ class Cycle:
         """The same cycle with every move slower by `factor`; holds and pauses last as they did."""
         return Cycle(self.mission, tuple(leg.stretched(factor) for leg in self.legs), self.order, self.notes)
 
+    @property
+    def moves(self) -> list[slice]:
+        """The samples of each move in `trajectory`."""
+        return [samples for leg, samples in self.slices() if leg.moves]
+
     def slices(self) -> Iterator[tuple[Leg, slice]]:
         """Each leg and its samples in `trajectory`."""
         begin = 0
@@ -200,11 +212,14 @@ class Cycle:
             begin = end
 
 
-def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase | None = None, step: float = STEP) -> Cycle:
+def plan_cycle(
+    boom: Boom, mission: Mission, vehicle: VehicleCase | None = None, step: float = STEP, track: Track = iter
+) -> Cycle:
     """A mission's legs, planned one after the other, sampled as finely as the checks of a lone move.
 
     Args:
         vehicle: a slope to stand on; what changes with time has no place in a cycle.
+        track: iterates over the steps, and may show how far it is.
 
     Raises:
         InputError: a step is malformed, or the vehicle does more than stand on a slope; the step is named.
@@ -214,9 +229,10 @@ def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase | None = None,
     table = mission.table
     q = resolve(boom, parse_target(table.start), parse_pitch(table.pitch), parse_hold(table.hold))
     start, legs, known, order, notes = q, [], {}, [], []
-    for number, (where, part) in enumerate(_expanded(table.steps, "steps"), start=1):
-        if number > _MOST_STEPS:
-            raise InputError(f"mission {mission.name}: more than {_MOST_STEPS:,} steps")
+    steps = list(islice(_expanded(table.steps, "steps"), _MOST_STEPS + 1))
+    if len(steps) > _MOST_STEPS:
+        raise InputError(f"mission {mission.name}: more than {_MOST_STEPS:,} steps")
+    for where, part in track(steps):
         key = (id(part), tuple(np.round(q, _DECIMALS) + 0.0))  # a cycle comes back to a position to rounding
         if key not in known:
             try:
@@ -258,8 +274,7 @@ def check_cycle(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", veh
     report = check(
         boom, cycle.trajectory, payload_as=payload_as, vehicle=vehicle, profile=f"mission {cycle.mission.name}", duty=cycle.duty
     )
-    origin = cycle.mission.origin
-    stated = (f"the mission: {origin.source}",) if origin.basis is Basis.ASSUMED else ()
+    stated = cycle.mission.assumptions
     return replace(report, notes=(*leg_sentences(cycle), *report.notes), assumptions=(*stated, *report.assumptions))
 
 

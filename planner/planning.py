@@ -30,6 +30,7 @@ from planner.stopping import worst_stop
 from planner.targets import Target, resolve
 from planner.time_law import Motion
 from planner.timing import Profile, Timing, timed
+from planner.tracking import Track
 from planner.trajectory import STEP, Trajectory, at_rest, check_size, joined, sample
 from planner.vehicle import VehicleCase, base_motion
 
@@ -127,13 +128,16 @@ def plan(
     return _move(boom, timing.profile, vehicle, coarse, fine, motions, tilt)
 
 
-def plan_each_profile(boom: Boom, start: Target, goal: Target) -> list[Trajectory]:
+def plan_each_profile(boom: Boom, start: Target, goal: Target, track: Track = iter) -> list[Trajectory]:
     """The move in the least time of each profile, as samples.
+
+    Args:
+        track: iterates over the profiles, and may show how far it is.
 
     Raises:
         InputError, InfeasibleError: as `plan`.
     """
-    return [plan(boom, start, goal, profile=profile).trajectory for profile in Profile]
+    return [plan(boom, start, goal, profile=profile).trajectory for profile in track(list(Profile))]
 
 
 def check(

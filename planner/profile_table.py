@@ -8,10 +8,12 @@ import numpy as np
 
 from boom_model import Boom
 from planner.constraints import jerk_stretch
+from planner.markdown import table
 from planner.planning import Move, plan
 from planner.report import Report
 from planner.targets import Target
 from planner.timing import Profile
+from planner.tracking import Track
 
 
 @dataclass(frozen=True)
@@ -37,18 +39,19 @@ class ProfileRow:
 HEADER = ("profile", "duration", "velocity", "acceleration", "jerk", "gearbox", "motor torque", "motor speed", "worst stop")
 
 
-def profile_moves(boom: Boom, start: Target, goal: Target, **options: Any) -> dict[str, Move]:
+def profile_moves(boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any) -> dict[str, Move]:
     """One move with every profile, the time-optimal one also with its jerk bounded, by name.
 
     Args:
+        track: iterates over the profiles, and may show how far it is.
         options: of `plan`, other than the profile's.
 
     Raises:
         InputError, InfeasibleError: as `plan`.
     """
-    moves = {str(profile): plan(boom, start, goal, profile=profile, **options) for profile in Profile}
-    smooth = plan(boom, start, goal, profile=Profile.TIME_OPTIMAL, jerk_bound=True, **options)
-    return moves | {"time-optimal, jerk bound": smooth}
+    timings: list[tuple[str, dict[str, Any]]] = [(profile.value, {"profile": profile}) for profile in Profile]
+    timings.append(("time-optimal, jerk bound", {"profile": Profile.TIME_OPTIMAL, "jerk_bound": True}))
+    return {name: plan(boom, start, goal, **timing, **options) for name, timing in track(timings)}
 
 
 def profile_table(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[ProfileRow, ...]:
@@ -63,8 +66,7 @@ def profile_rows(moves: Mapping[str, Move]) -> tuple[ProfileRow, ...]:
 
 def profile_markdown(rows: Sequence[ProfileRow]) -> str:
     """The rows as a table in Markdown."""
-    lines = [" | ".join(HEADER), " | ".join("---" for _ in HEADER), *(" | ".join(cells(row)) for row in rows)]
-    return "\n".join(f"| {line} |" for line in lines) + "\n"
+    return "\n".join(table(HEADER, map(cells, rows))) + "\n"
 
 
 def cells(row: ProfileRow) -> tuple[str, ...]:

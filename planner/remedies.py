@@ -1,6 +1,6 @@
 """What would mend a move that cannot be made: the smallest single change of each kind, verified by planning again."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -11,6 +11,7 @@ from boom_model import JOINTS, ActuatorHorizontal, Boom, Drive, InfeasibleError
 from planner.checks import Verdict
 from planner.planning import plan
 from planner.targets import Target, resolve
+from planner.tracking import Track
 
 _MOST = 4.0
 """The largest factor on a duration, a ratio or a drive that is tried."""
@@ -21,7 +22,6 @@ _BISECTIONS = 8
 
 Works = Callable[..., bool]
 Change = Callable[[Boom, Sequence[int], float], Boom]
-Track = Callable[[list[Any]], Iterable[Any]]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from planner.certificate import Certificate, WorstRatio
 from planner.checks import ANGLE_CHECKS
+from planner.markdown import section, table
 from planner.rows import Row, Verdict, overall
 from planner.stopping import WorstStop
 
@@ -113,27 +114,15 @@ class Report:
     def to_markdown(self) -> str:
         """The report as Markdown, in people's units."""
         header = ("joint", "check", "demand", "limit", "margin", "required", "at", "verdict", "basis", "source")
-        lines = [
-            f"# {self.summary}",
-            "",
-            f"{self.profile}, {self.duration:.3f} s",
-            "",
-            "| " + " | ".join(header) + " |",
-            "|" + " --- |" * len(header),
-        ]
-        lines += ["| " + " | ".join((*cells(row), row.source)) + " |" for row in self.rows]
+        lines = [f"# {self.summary}", "", f"{self.profile}, {self.duration:.3f} s", ""]
+        lines += table(header, [(*cells(row), row.source) for row in self.rows])
         if self.peaks:
-            lines += ["", "## Largest torques and where they come from", "", "| " + " | ".join(PEAK_HEADER) + " |"]
-            lines += ["|" + " --- |" * len(PEAK_HEADER)]
-            lines += ["| " + " | ".join(peak_cells(peak)) + " |" for peak in self.peaks]
+            lines += ["", "## Largest torques and where they come from", "", *table(PEAK_HEADER, map(peak_cells, self.peaks))]
         if self.certificate is not None:
-            lines += ["", "## Certificate", "", "| " + " | ".join(CERTIFICATE_HEADER) + " |"]
-            lines += ["|" + " --- |" * len(CERTIFICATE_HEADER)]
-            lines += ["| " + " | ".join(worst_cells(worst)) + " |" for worst in self.certificate.worst]
+            lines += ["", "## Certificate", "", *table(CERTIFICATE_HEADER, map(worst_cells, self.certificate.worst))]
         lines += [f"\n{sentence}" for sentence in self.sentences]
         for title, texts in (("Would mend it", self.remedies), ("Notes", self.notes), ("Assumed", self.assumptions)):
-            if texts:
-                lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
+            lines += section(title, texts)
         return "\n".join(lines) + "\n"
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from boom_model import JOINTS, InputError
+from planner.markdown import section, table
 from planner.report import Report, cells
 from planner.rows import Row
 
@@ -38,8 +39,21 @@ def compared(reports: Mapping[str, Report], joints: Sequence[str]) -> tuple[tupl
 
 def comparison_markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """The table of `compared` as Markdown."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+    return "\n".join(table(header, rows)) + "\n"
+
+
+def side_by_side_markdown(reports: Mapping[str, Report], joints: Sequence[str]) -> str:
+    """Several reports as one in Markdown: their summaries, the table of `compared`, notes of each, what is assumed.
+
+    Raises:
+        InputError: as `compared`.
+    """
+    lines = ["# " + ", ".join(reports), "", *(f"- {name}: {report.summary}" for name, report in reports.items()), ""]
+    lines += table(*compared(reports, joints))
+    for name, report in reports.items():
+        lines += section(f"Notes on {name}", report.notes)
+    lines += section("Assumed", list(dict.fromkeys(text for report in reports.values() for text in report.assumptions)))
+    return "\n".join(lines) + "\n"
 
 
 def _pair(row: Row | None) -> tuple[str, str]:

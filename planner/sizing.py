@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import islice
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from planner.checks import drive_rows, joint_views
 from planner.joint_view import JointView
 from planner.missions import Cycle, Mission, plan_cycle
 from planner.rows import Row, Verdict, overall
+from planner.tracking import Track
 
 POWER_OFF = "power-off hold"
 """The brake's matter, whatever drive it holds: left out of the choice."""
@@ -217,21 +219,26 @@ def choose(
     voltages: Sequence[float] = (),
     adapt: Adapt = Adapt.NOTHING,
     payload_as: PayloadAs = "mass",
+    track: Track = iter,
 ) -> tuple[Choice, ...]:
     """The catalogue for each joint of each boom, on the same cycle.
 
     Args:
         booms: variants by name, of the same geometry.
+        track: iterates over the drives, and may show how far it is.
     """
+    asked = [
+        (name, boom, joint, candidates(boom, joint, catalogue, voltages)) for name, boom in booms.items() for joint in joints
+    ]
+    steps = iter(track([drive for *_, drives in asked for drive in drives]))
     return tuple(
         Choice(
             name,
             joint,
             fitted(boom, cycle, joint, payload_as),
-            size(boom, cycle, joint, candidates(boom, joint, catalogue, voltages), adapt=adapt, payload_as=payload_as),
+            size(boom, cycle, joint, islice(steps, len(drives)), adapt=adapt, payload_as=payload_as),
         )
-        for name, boom in booms.items()
-        for joint in joints
+        for name, boom, joint, drives in asked
     )
 
 

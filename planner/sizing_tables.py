@@ -7,9 +7,9 @@ from typing import Any
 
 from boom_model import LinearDrive
 from boom_model.drives import STEPPER_MARGIN
+from planner.markdown import section, table
 from planner.report import cells
 from planner.rows import Row, Verdict
-from planner.side_by_side import comparison_markdown
 from planner.sizing import Choice, Judged
 
 SAVING = ("boom", "joint", "fitted", "lightest without a FAIL", "saves")
@@ -71,16 +71,14 @@ def unknown_checks(choices: Sequence[Choice]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(check for choice in choices for judged in choice.judged for check in judged.unknown))
 
 
-def sizing_markdown(title: str, choices: Sequence[Choice], notes: Sequence[str]) -> str:
+def sizing_markdown(title: str, choices: Sequence[Choice], notes: Sequence[str], assumed: Sequence[str] = ()) -> str:
     """Everything as Markdown."""
-    parts = [f"# {title}\n"]
-    parts += ["## What the lightest saves\n", comparison_markdown(SAVING, saving(choices))]
-    parts += ["## Each drive in its best supply\n", comparison_markdown(*motors(choices))]
-    for choice in choices:
-        parts += [f"## {choice.joint}, {choice.variant}\n", comparison_markdown(*ranking(choice))]
-        parts += [f"All are warned of: {', '.join(choice.warned)}\n"] if choice.warned else []
-    parts += ["## Notes\n", "".join(f"- {note}\n" for note in notes)]
-    return "\n".join(parts)
+    lines = [f"# {title}", "", "## What the lightest saves", "", *table(SAVING, saving(choices))]
+    lines += ["", "## Each drive in its best supply", "", *table(*motors(choices))]
+    for choice in (choice for choice in choices if choice.judged):
+        lines += ["", f"## {choice.joint}, {choice.variant}", "", *table(*ranking(choice))]
+        lines += ["", f"All are warned of: {', '.join(choice.warned)}"] if choice.warned else []
+    return "\n".join([*lines, *section("Notes", notes), *section("Assumed", assumed)]) + "\n"
 
 
 def sizing_json(mission: str, choices: Sequence[Choice], notes: Sequence[str]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import sys
 from dataclasses import asdict
 
@@ -301,17 +302,39 @@ def test_infeasible_plan_as_json_is_still_one_object(boom):
     assert answer["reason"] in err
 
 
-def test_every_command_has_a_help_text(boom):
-    for name in cli.cli.commands:
-        code, out, _ = boom(name, "--help")
-        assert code == 0
-        assert out.startswith(f"Usage: boom {name}")
+@pytest.mark.parametrize("name", cli.cli.commands)
+def test_every_command_has_a_help_text_with_an_example(boom, name):
+    code, out, _ = boom(name, "--help")
+    assert code == 0
+    assert out.startswith(f"Usage: boom {name}")
+    assert re.search(rf"\n\n  Examples?:\n(    boom .+\n)*?    boom (.+ )?{name}( .+)?\n", out)
+    assert "-q, --quiet" in out
+
+
+def test_quiet_prints_nothing_but_json_and_complaints(boom):
+    move = ("transport", "phenotyping")
+    assert boom("plan", *move, "--csv", "move.csv", "-q") == (0, "", "")
+    assert os.path.exists("move.rrd")
+    for command in (
+        ("ik", "1.4", "0", "1.0"),
+        ("check", "move.csv"),
+        ("torque", "move.csv", "--out", "tau.csv"),
+        ("validate",),
+    ):
+        assert boom(*command, "--quiet") == (0, "", "")
+        code, out, err = boom(*command, "--quiet", "--json")
+        assert (code, err) == (0, "")
+        assert isinstance(json.loads(out), dict)
+    assert boom("export", "tau.csv", "tau.json", "-q") == (0, "", "")
+    code, out, err = boom("ik", "9", "9", "9", "-q")
+    assert (code, out) == (1, "")
+    assert "out of reach" in err
 
 
 def test_mission_checks_a_whole_cycle(boom, tmp_path):
-    code, out, err = boom("mission", "field-day", "--picture", "drives.png", "--out", "day.md")
+    code, out, err = boom("mission", "field-day", "--picture", "drives.png", "--report", "day.md")
     assert (code, err) == (0, "")
-    assert sorted(os.listdir(tmp_path)) == ["day.md", "drives.png"]
+    assert sorted(os.listdir(tmp_path)) == ["day-1.png", "day-2.png", "day-3.png", "day.md", "drives.png"]
     assert "mission field day" in out
     assert "20 x to tip=-1,1.7,0.9 along line" in out
     assert (tmp_path / "drives.png").read_bytes().startswith(b"\x89PNG")
@@ -322,10 +345,11 @@ def test_mission_checks_a_whole_cycle(boom, tmp_path):
     assert {row["verdict"] for row in answer["checks"]} == {"PASS", "WARN", "INFO", "NOT CHECKABLE"}
 
 
-def test_missions_stand_side_by_side(boom):
-    code, out, _ = boom("mission", "table-2-4", "table-3-1", "--joint", "inner", "--out", "both.md")
+def test_missions_stand_side_by_side(boom, tmp_path):
+    code, out, _ = boom("mission", "table-2-4", "table-3-1", "--joint", "inner", "--report", "both.md")
     assert code == 0
     assert "table 3-1: INCOMPLETE" in out
+    assert "table 2-4: demand of limit" in (tmp_path / "both.md").read_text()
     code, out, _ = boom("mission", "table-2-4", "table-3-1", "--json")
     assert sorted(json.loads(out)["missions"]) == ["table 2-4", "table 3-1"]
     code, _, err = boom("mission", "table-2-4", "table-3-1", "--picture", "x.png")
@@ -338,7 +362,7 @@ def test_missions_stand_side_by_side(boom):
 
 
 def test_size_ranks_the_catalogue(boom, tmp_path):
-    code, out, err = boom("size", "table-3-1", "--variant", "inner=5.55", "--voltage", "80", "--out", "drives.md")
+    code, out, err = boom("size", "table-3-1", "--variant", "inner=5.55", "--voltage", "80", "--report", "drives.md")
     assert (code, err) == (0, "")
     assert "Note: extension: NOT CHECKED, the catalogue has nothing for it" in out
     assert "| inner=5.55 | together |  |  | 2.0 kg |" in (tmp_path / "drives.md").read_text()

@@ -13,6 +13,7 @@ from planner.control.plant import Plant, accelerations, equilibrium, friction, s
 from planner.control.shaping import Impulses
 from planner.planning import Move
 from planner.time_law import Motion
+from planner.tracking import Track
 from planner.vehicle import VehicleCase, base_motion
 
 DIVERGED = 1.0
@@ -175,6 +176,7 @@ def simulate(
     substeps: int | None = None,
     continuous: bool = False,
     compensate_sag: bool = False,
+    track: Track = iter,
 ) -> Run:
     """Follows every case from rest, by the classical Runge-Kutta method at `substeps` steps a sampling period.
 
@@ -189,6 +191,7 @@ def simulate(
         substeps: None takes as many as make a step of at most 1 ms.
         continuous: whether torques follow exact states at every stage of the integrator, without sampling and filter.
         compensate_sag: whether the motors are sent ahead by the twist that the model's gravity gives.
+        track: iterates over the sampling periods, and may show how far it is.
 
     Raises:
         InputError: no cases, or a duration that is not above 0.
@@ -270,7 +273,7 @@ def simulate(
     shape = (count, B, 5)
     q_s, qd_s, motor_s, torque_s, limit_s = (np.empty(shape) for _ in range(5))
     spring_s = np.empty((count, B, len(E)))
-    for k in range(count):
+    for k in track(list(range(count))):
         i = 2 * substeps * k
         q, qd, theta, theta_d = _split(x, len(E))
         motor, motor_d = _seen(q, theta, E), _seen(qd, theta_d, E)

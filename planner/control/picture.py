@@ -86,6 +86,12 @@ def error_figure(study: Study) -> "Figure":
     return figure
 
 
+def study_pictures(study: Study) -> dict[str, "Figure"]:
+    """Both, by title; a study of steppers alone has no loops."""
+    loops = {"Loops": loop_figure(study)} if study.designs else {}
+    return {"Tip errors": error_figure(study)} | loops
+
+
 def write_figure(path: str | Path, figure: "Figure") -> None:
     """Writes a figure as a PNG.
 

@@ -15,8 +15,10 @@ from planner.control.design import Controller, Goals, Loop, analyse
 from planner.control.figures import Figures
 from planner.control.plant import Plant, natural_frequencies
 from planner.control.shaping import Impulses, Shaper, impulses
+from planner.markdown import section, table
 from planner.planning import Move
 from planner.report import assumptions
+from planner.tracking import Track
 from planner.vehicle import VehicleCase
 
 POSES = 9
@@ -161,13 +163,12 @@ class Study:
     def to_markdown(self) -> str:
         """The report as Markdown, in people's units."""
         lines = [f"# {self.summary}", "", self.modes_sentence, ""]
-        lines += [*_markdown(ROW_HEADER, [row_cells(row) for row in self.rows]), "", ROW_LEGEND]
+        lines += [*table(ROW_HEADER, map(row_cells, self.rows)), "", ROW_LEGEND]
         if self.designs:
             lines += ["", "## Loops at the goal, each joint's broken with the others closed", ""]
-            lines += _markdown(LOOP_HEADER, [cells for design in self.designs for cells in loop_cells(design)])
+            lines += table(LOOP_HEADER, [cells for design in self.designs for cells in loop_cells(design)])
         for title, texts in (("Cases", self.reasons), ("Notes", self.notes), ("Assumed", self.assumptions)):
-            if texts:
-                lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
+            lines += section(title, texts)
         return "\n".join(lines) + "\n"
 
     @property
@@ -180,11 +181,19 @@ class Study:
 
 
 def study(
-    boom: Boom, moves: Sequence[Move], controllers: Sequence[Controller], shapers: Sequence[Shaper], setup: Setup | None = None
+    boom: Boom,
+    moves: Sequence[Move],
+    controllers: Sequence[Controller],
+    shapers: Sequence[Shaper],
+    setup: Setup | None = None,
+    track: Track = iter,
 ) -> Study:
     """Follows every move with every controller and shaper, and measures what comes of it.
 
     The shapers are made for the lowest mode at the first move's goal, motors held, with the structural damping ratio.
+
+    Args:
+        track: iterates over the controllers' periods, and may show how far it is.
 
     Raises:
         InputError: nothing to simulate, a payload below 0, or a shaper for a plant in which no joint is elastic.
@@ -217,6 +226,7 @@ def study(
         vehicle=setup.vehicle,
         gust=setup.gust,
         compensate_sag=setup.compensate_sag,
+        track=track,
     )
     off = forward_kinematics(boom, run.q).position - forward_kinematics(boom, run.command).position
     tip_error = np.linalg.norm(off, axis=-1)
@@ -434,12 +444,4 @@ def loop_cells(design: Design) -> list[tuple[str, ...]]:
             shown(m.sensitivity_peak, 2),
         )
         for m in design.loop.margins
-    ]
-
-
-def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    return [
-        "| " + " | ".join(header) + " |",
-        "|" + " --- |" * len(header),
-        *("| " + " | ".join(row) + " |" for row in rows),
     ]

@@ -1,0 +1,202 @@
+"""A planned move followed in closed loop."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+
+from boom_model import InputError
+from planner.cli.options import (
+    boom_option,
+    check_report,
+    hold_option,
+    json_option,
+    load_boom,
+    payload_option,
+    pitch_option,
+    report_option,
+    vehicle_option,
+)
+from planner.cli.printing import ANSWER_IS_NO, STYLES, new_console, new_table, print_files, print_json, print_lines, tracked
+from planner.targets import parse_hold, parse_pitch, parse_target
+
+if TYPE_CHECKING:
+    from planner.control.study import Study
+
+
+@click.command(context_settings={"ignore_unknown_options": True})
+@click.argument("start")
+@click.argument("goal")
+@click.option(
+    "--profile", "profiles", default="cubic", show_default=True, metavar="NAME,...|all", help="Profiles as in `boom plan`."
+)
+@click.option(
+    "--controller", "controllers", default="all", show_default=True, metavar="NAME,...|all",
+    help="pd, pid, computed-torque, lqr (with integral action), stepper (open loop).",
+)  # fmt: skip
+@click.option(
+    "--shaper", "shapers", default="none", show_default=True, metavar="NAME,...|all",
+    help="none, zv, zvd: impulses that cancel the lowest mode, for half a period or a whole one.",
+)  # fmt: skip
+@click.option("--bandwidth", default=6.0, show_default=True, metavar="HZ", help="Natural frequency of the loops' poles.")
+@click.option("--damping", default=1.0, show_default=True, help="Damping ratio of the loops' poles.")
+@click.option("--integral", default=0.3, show_default=True, help="Integral action's pole, as a share of the bandwidth.")
+@click.option("--duration", type=float, metavar="S", help="As in `boom plan`.")
+@pitch_option
+@hold_option
+@payload_option
+@click.option("--payload-error", default=0.0, metavar="KG", help="True payload less the one that the controllers believe in.")
+@click.option("--gust", metavar="FX,FY,FZ,START,DURATION", help="A push on the tip, (1 - cos)/2, in N along frame 1 and s.")
+@click.option("--rigid-joints", is_flag=True, help="Leave out the gearboxes' elasticity, friction and the links' bending.")
+@click.option("--rigid-links", is_flag=True, help="Leave out the bending of inner link and extension.")
+@click.option("--backlash", is_flag=True, help="With the gearboxes' backlash.")
+@click.option("--compensate-sag", is_flag=True, help="Send the motors ahead by the twist that the weight gives.")
+@click.option("--settle-mm", default=1.0, show_default=True, metavar="MM", help="Within which the tip counts as settled.")
+@click.option(
+    "--set", "figures", multiple=True, metavar="NAME=VALUE",
+    help="A figure that is assumed otherwise, as the report names it: rate_Hz, structural_damping, ...; may be given again.",
+)  # fmt: skip
+@click.option("--out", metavar="FILE.rrd", help="The recording, for `boom view`.")
+@click.option("--loops", metavar="FILE.png", help="Bode diagrams and poles as a picture.")
+@click.option("--errors", metavar="FILE.png", help="The tip's errors as a picture.")
+@report_option
+@vehicle_option
+@boom_option
+@json_option
+def control(
+    start: str,
+    goal: str,
+    profiles: str,
+    controllers: str,
+    shapers: str,
+    bandwidth: float,
+    damping: float,
+    integral: float,
+    duration: float | None,
+    pitch: str,
+    hold: str,
+    payload: float | None,
+    payload_error: float,
+    gust: str | None,
+    rigid_joints: bool,
+    rigid_links: bool,
+    backlash: bool,
+    compensate_sag: bool,
+    settle_mm: float,
+    figures: tuple[str, ...],
+    out: str | None,
+    loops: str | None,
+    errors: str | None,
+    document: str | None,
+    vehicle: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Follow a planned move in closed loop: design, margins, simulation of the full model, and how far off the tip is.
+
+    START and GOAL are as in `boom plan`. Exit code 1: a loop is unstable, or a stepper loses a step.
+
+    \b
+    Examples:
+      boom control transport phenotyping --profile all --report followed.pdf
+      boom control transport phenotyping --controller pid,stepper --shaper all --out control.rrd
+      boom control transport phenotyping --payload-error 2 --gust 0,0,-30,5.2,0.5 --set structural_damping=0.01
+    """
+    from planner.control.closed_loop import parse_gust
+    from planner.control.design import Controller, Goals
+    from planner.control.figures import parse_figures
+    from planner.control.shaping import Shaper
+    from planner.control.study import Setup, study
+    from planner.files import check_writable
+    from planner.planning import plan as plan_move
+    from planner.timing import Profile
+    from planner.vehicle import load_case
+
+    boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    if not np.isfinite(settle_mm) or not settle_mm > 0.0:
+        raise InputError(f"settle-mm is {settle_mm:g}; it must be a finite number above 0")
+    setup = Setup(
+        goals=Goals.of(bandwidth, damping, integral),
+        figures=parse_figures(figures),
+        elastic=not rigid_joints,
+        bending=not rigid_links,
+        backlash=backlash,
+        compensate_sag=compensate_sag,
+        payload_error=payload_error,
+        vehicle=case,
+        gust=None if gust is None else parse_gust(gust),
+        settled=settle_mm * 1e-3,
+    )
+    chosen = [_several("controller", controllers, list(Controller)), _several("shaper", shapers, list(Shaper))]
+    for name in (loops, errors):
+        if name is not None and not name.endswith(".png"):
+            raise InputError(f"{name}: a picture is written as .png")
+    if loops is not None and chosen[0] == [Controller.STEPPER]:
+        raise InputError("a stepper runs open loop: there is no Bode diagram of it")
+    check_report(document)
+    check_writable(out, loops, errors, document)
+    ends, held, angle = (parse_target(start), parse_target(goal)), parse_hold(hold), parse_pitch(pitch)
+    moves = [
+        plan_move(boom, *ends, profile=profile, duration=duration, pitch=angle, hold=held, vehicle=case)
+        for profile in _several("profile", profiles, list(Profile))
+    ]
+    names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
+    found = study(boom, moves, *names, setup, tracked("simulating"))
+    written = {}
+    if out is not None:
+        from planner.recording import write_control_recording
+
+        write_control_recording(out, found)
+        written["recording"] = out
+    if loops is not None or errors is not None:
+        from planner.control.picture import error_figure, loop_figure, write_figure
+
+        for kind, name, figure in (("loops", loops, loop_figure), ("errors", errors, error_figure)):
+            if name is not None:
+                write_figure(name, figure(found))
+                written[kind] = name
+    if document is not None:
+        from planner.control.picture import study_pictures
+        from planner.document import write_document
+
+        write_document(document, found.to_markdown(), study_pictures(found))
+        written["report"] = document
+    return _print_study(found, written, as_json)
+
+
+def _print_study(study: "Study", written: dict[str, str], as_json: bool) -> int:
+    from planner.control.study import LOOP_HEADER, ROW_HEADER, ROW_LEGEND, loop_cells, row_cells
+
+    if as_json:
+        print_json(study.to_json(written))
+        return ANSWER_IS_NO if study.failed else 0
+    console = new_console()
+    table = new_table(*ROW_HEADER)
+    for row in study.rows:
+        table.add_row(*row_cells(row), style=STYLES.get(row.outcome))
+    console.print(table)
+    console.print(ROW_LEGEND, highlight=False)
+    if study.designs:
+        console.print("Loops at the goal, each joint's broken with the others closed", highlight=False)
+        table = new_table(*LOOP_HEADER)
+        for design in study.designs:
+            for i, cells in enumerate(loop_cells(design)):
+                table.add_row(*cells, end_section=i == 4)
+        console.print(table)
+    print_lines("Case", study.reasons)
+    print_lines("Note", study.notes)
+    print_lines("Assumed", study.assumptions)
+    console.print(study.modes_sentence, highlight=False, soft_wrap=True)
+    console.print(study.summary, style="bold red" if study.failed else None, highlight=False, soft_wrap=True)
+    print_files(written)
+    return ANSWER_IS_NO if study.failed else 0
+
+
+def _several(what: str, text: str, known: Sequence[str]) -> list[str]:
+    """The names of a list with commas, or all of them."""
+    names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",")))
+    for name in names:
+        if name not in known:
+            raise InputError(f"{what} is {name!r}; there are: {', '.join(known)}, or all")
+    return names

@@ -1,0 +1,175 @@
+"""Jobs on a duty cycle: check it, and size the drives for it."""
+
+from typing import Any
+
+import click
+
+from boom_model import InputError
+from planner.cli.options import (
+    boom_option,
+    check_picture,
+    check_report,
+    given_catalogue,
+    json_option,
+    load_boom,
+    payload_as_option,
+    payload_option,
+    picture_option,
+    report_option,
+    vehicle_option,
+)
+from planner.cli.printing import ANSWER_IS_NO, print_files, print_json, print_lines, print_report, print_rows, tracked
+
+
+@click.command()
+@click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
+@click.option("--joint", "joints", multiple=True, help="Compare the drive checks of this joint alone; may be given again.")
+@payload_option
+@payload_as_option
+@vehicle_option
+@report_option
+@picture_option
+@boom_option
+@json_option
+def mission(
+    missions: tuple[str, ...],
+    joints: tuple[str, ...],
+    payload: float | None,
+    payload_as: Any,
+    vehicle: str | None,
+    picture: str | None,
+    document: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Check a duty cycle of moves, holds and pauses as a whole; several of them side by side.
+
+    MISSION is a FILE.toml, or one of field-day, table-2-4 and table-3-1.
+
+    \b
+    Examples:
+      boom mission field-day --picture drives.png
+      boom mission table-2-4 table-3-1 --joint inner --joint lower --report judged.pdf
+    """
+    from planner.document import write_document
+    from planner.drive_pictures import drive_pages, write_drive_picture
+    from planner.files import check_writable
+    from planner.missions import check_cycle, load_mission, plan_cycle
+    from planner.planning import torques
+    from planner.rows import Verdict
+    from planner.side_by_side import compared, side_by_side_markdown
+    from planner.vehicle import load_case
+
+    boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    check_picture(picture)
+    check_report(document)
+    check_writable(picture, document)
+    if picture is not None and len(missions) > 1:
+        raise InputError(f"--picture {picture}: a page shows one mission, and {len(missions)} are given")
+    loaded = [load_mission(name) for name in missions]
+    cycles = {each.name: plan_cycle(boom, each, case, track=tracked(f"planning {each.name}")) for each in loaded}
+    if len(cycles) < len(missions):
+        raise InputError(f"two missions bear one name: {', '.join(each.name for each in loaded)}")
+    reports = {name: check_cycle(boom, cycle, payload_as=payload_as, vehicle=case) for name, cycle in cycles.items()}
+    written: dict[str, str] = {}
+    header, rows = compared(reports, joints)
+    alone = len(reports) == 1 and not joints
+    drawn = {
+        name: (boom, cycle.trajectory, torques(boom, cycle.trajectory, payload_as, case), reports[name], cycle.moves)
+        for name, cycle in (cycles.items() if picture or document else ())
+    }
+    if document is not None:
+        text = next(iter(reports.values())).to_markdown() if alone else side_by_side_markdown(reports, joints)
+        pages = {name: drive_pages(*shown) for name, shown in drawn.items()}
+        titled = {
+            title if alone else f"{name}: {title}": page for name, page_of in pages.items() for title, page in page_of.items()
+        }
+        write_document(document, text, titled)
+        written["report"] = document
+    if picture is not None:
+        write_drive_picture(picture, *next(iter(drawn.values())))
+        written["picture"] = picture
+    if alone:
+        return print_report(next(iter(reports.values())), written, as_json)
+    if as_json:
+        print_json({"missions": {name: report.to_json({}) for name, report in reports.items()}, "files": written})
+    else:
+        print_rows(header, rows)
+        for name, report in reports.items():
+            print_lines(f"{name}", (report.summary,))
+        print_files(written)
+    return ANSWER_IS_NO if any(report.verdict is Verdict.FAIL for report in reports.values()) else 0
+
+
+@click.command()
+@click.argument("mission", default="field-day")
+@click.option("--joint", "joints", multiple=True, help="Size this joint; may be given again; else every one.")
+@click.option("--voltage", "voltages", type=float, multiple=True, metavar="V", help="Bus voltage to try; may be given again.")
+@click.option(
+    "--adapt", type=click.Choice(["nothing", "rescale", "replan"]), default="nothing", show_default=True,
+    help="What may change to suit a drive: the moves slowed evenly, or planned anew.",
+)  # fmt: skip
+@click.option(
+    "--variant", "variants", multiple=True, metavar="BODY=KG,...",
+    help="A boom of other masses beside the given one, payload=KG among them; may be given again.",
+)  # fmt: skip
+@payload_option
+@payload_as_option
+@report_option
+@boom_option
+@json_option
+def size(
+    mission: str,
+    joints: tuple[str, ...],
+    voltages: tuple[float, ...],
+    adapt: str,
+    variants: tuple[str, ...],
+    payload: float | None,
+    payload_as: Any,
+    document: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Go through the catalogue for each joint: what does not fail, ranked by mass and margin, and why the rest does.
+
+    \b
+    Example:
+      boom size field-day --variant inner=5.55 --variant payload=5 --report drives.html
+    """
+    from boom_model import JOINTS, Catalogue
+    from planner.document import write_document
+    from planner.files import check_writable
+    from planner.missions import load_mission, plan_cycle
+    from planner.report import assumptions
+    from planner.sizing import Adapt, choose, parse_variant
+    from planner.sizing_pictures import sizing_pictures
+    from planner.sizing_tables import SAVING, motors, ranking, saving, sizing_json, sizing_markdown, sizing_notes
+
+    boom = load_boom(boom_file, payload)
+    check_report(document)
+    check_writable(document)
+    catalogue = Catalogue.load().with_file(given_catalogue())
+    booms = {"as it is": boom} | {text: parse_variant(boom, text) for text in variants}
+    cycle = plan_cycle(boom, load_mission(mission), track=tracked("planning the mission"))
+    choices = choose(
+        booms, cycle, joints or JOINTS, catalogue, voltages, Adapt(adapt), payload_as, tracked("going through the catalogue")
+    )
+    notes, written = sizing_notes(choices), {} if document is None else {"report": document}
+    if document is not None:
+        assumed = (*cycle.mission.assumptions, *assumptions(boom, cycle.trajectory.qddd is not None))
+        text = sizing_markdown(f"Drives for the mission {cycle.mission.name}", choices, notes, assumed)
+        write_document(document, text, sizing_pictures(choices))
+    if as_json:
+        print_json(sizing_json(cycle.mission.name, choices, notes) | {"files": written})
+    else:
+        for choice in (choice for choice in choices if choice.judged):
+            click.echo(f"{choice.joint}, {choice.variant}")
+            print_rows(*ranking(choice))
+            print_lines("All are warned of", choice.warned)
+        click.echo("Each drive in its best supply")
+        print_rows(*motors(choices))
+        click.echo("What the lightest saves")
+        print_rows(SAVING, saving(choices))
+        print_lines("Note", notes)
+        print_files(written)
+    return ANSWER_IS_NO if any(choice.judged and choice.lightest is None for choice in choices) else 0

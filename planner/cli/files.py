@@ -1,0 +1,184 @@
+"""Exports and imports, the validation against the thesis, and the viewer."""
+
+import subprocess
+import sys
+from typing import Any
+
+import click
+
+from boom_model import Boom, InputError
+from planner.cli.options import boom_option, json_option, load_boom, payload_as_option, payload_option
+from planner.cli.printing import ANSWER_IS_NO, print_files, print_json, print_lines, print_rows
+
+
+@click.command()
+@click.argument("motion", metavar="IN")
+@click.argument("out", metavar="OUT")
+def export(motion: str, out: str) -> int:
+    """Turn a motion into another tool's form, by the ending of OUT.
+
+    \b
+    .csv          t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, and tau1..tau5 where IN has them
+    .parquet      the same columns, with their units
+    .yaml, .json  ROS trajectory_msgs/JointTrajectory
+
+    IN is a CSV or Parquet file; its torques go along as they are.
+
+    \b
+    Examples:
+      boom export move.csv move.parquet
+      boom torque move.csv --out torques.csv && boom export torques.csv move.yaml
+    """
+    from planner.motion_files import form_of, read_quantities, write_motion
+    from planner.trajectory import trajectory_of
+
+    form = form_of(out)
+    data, notes = read_quantities(motion)
+    trajectory = trajectory_of(motion, data, notes)
+    write_motion(trajectory, out, data.get("tau"))
+    print_lines("Note", trajectory.notes)
+    click.echo(f"{form[1:]}: {out}")
+    return 0
+
+
+@click.command()
+@click.argument("out", metavar="OUT.urdf|OUT.xml")
+@payload_option
+@boom_option
+def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
+    """Write the boom, with its payload, as URDF or as MJCF for MuJoCo (.xml).
+
+    \b
+    URDF  a tree: mimic joints keep the parallelogram. A torque that a tool computes for a
+          mimic joint belongs to the joint that it mimics.
+    MJCF  the loop closed by a constraint, a motor on each joint, the named poses as keyframes.
+
+    \b
+    Example:
+      boom export-model boom.urdf --payload 8
+    """
+    from planner.model_export import write_model
+
+    write_model(load_boom(boom_file, payload), out)
+    click.echo(f"model: {out}")
+    return 0
+
+
+@click.command(context_settings={"ignore_unknown_options": True})  # so that --offset takes -0.5
+@click.argument("planned", metavar="PLANNED")
+@click.argument("measured", metavar="MEASURED")
+@click.option(
+    "--offset", default="0", show_default=True, metavar="S|best",
+    help="Added to the log's times; best fits them to the plan, and so hides a delay of the drives.",
+)  # fmt: skip
+@click.option("--window", type=float, metavar="S", help="Width of the filter that differentiates the log; else 0.2 s.")
+@click.option("--out", metavar="FILE.rrd", help="A recording of both, for `boom view`.")
+@payload_option
+@payload_as_option
+@boom_option
+@json_option
+def compare(
+    planned: str,
+    measured: str,
+    offset: str,
+    window: float | None,
+    out: str | None,
+    payload: float | None,
+    payload_as: Any,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Hold a measured motion against its plan: where joints and tip were, and what torques that takes.
+
+    PLANNED and MEASURED are CSV or Parquet files. MEASURED holds t, q1..q5 in SI, and any of qd1..qd5, qdd1..qdd5 and
+    tau1..tau5; derivatives that it lacks come from a Savitzky-Golay filter, whose noise is reported.
+
+    \b
+    Example:
+      boom compare move.csv log.csv --offset best --out both.rrd
+    """
+    from planner.comparison import WINDOW, read_log
+    from planner.comparison import compare as compare_motions
+    from planner.files import check_writable
+    from planner.motion_files import read_motion
+
+    try:
+        shift = None if offset == "best" else float(offset)
+    except ValueError:
+        raise InputError(f"offset {offset!r} is neither a number of seconds nor best") from None
+    check_writable(out)
+    found = compare_motions(
+        load_boom(boom_file, payload),
+        read_motion(planned),
+        read_log(measured),
+        offset=shift,
+        window=WINDOW if window is None else window,
+        payload_as=payload_as,
+    )
+    written = {}
+    if out is not None:
+        from planner.recording import write_comparison_recording
+
+        write_comparison_recording(out, found)
+        written["recording"] = out
+    answer = found.to_json(written)
+    if as_json:
+        print_json(answer)
+        return 0
+    _print_comparison(answer)
+    return 0
+
+
+@click.command()
+@json_option
+def validate(as_json: bool) -> int:
+    """The thesis's tables 2-5 to 2-8 and 3-2 and its sections 3.5 and 3.6, row by row, against this model.
+
+    \b
+    Example:
+      boom validate
+    """
+    from planner.validation import validate as validate_model
+
+    rows = validate_model(Boom.load())
+    failed = sum(not row.ok for row in rows)
+    if as_json:
+        listed = [{**vars(row), "ok": row.ok} for row in rows]
+        print_json({"ok": failed == 0, "rows": listed})
+    else:
+        header = ("table", "row", "quantity", "expected", "actual", "tolerance", "ok", "note")
+        cells = []
+        for row in rows:
+            numbers = (f"{row.expected:.6g}", f"{row.actual:.5f}", f"{row.tolerance:.1g}")
+            cells.append((row.table, row.row, row.quantity, *numbers, "OK" if row.ok else "FAIL", row.note))
+        print_rows(header, cells)
+        click.echo(f"{len(rows) - failed} of {len(rows)} rows hold")
+    return ANSWER_IS_NO if failed else 0
+
+
+@click.command()
+@click.argument("recording", metavar="FILE.rrd", type=click.Path(exists=True, dir_okay=False))
+def view(recording: str) -> int:
+    """Open a recording in the Rerun viewer.
+
+    \b
+    Example:
+      boom view move.rrd
+    """
+    return subprocess.run([sys.executable, "-m", "rerun", "--bind", "127.0.0.1", recording], check=False).returncode
+
+
+def _print_comparison(answer: dict[str, Any]) -> None:
+    from planner.comparison import POSITION_HEADER, TORQUE_HEADER, position_cells, summary, torque_cells
+
+    for title, header, cells in (
+        ("Positions, measured less planned", POSITION_HEADER, position_cells),
+        ("Torques on level ground: the model's of the measured motion less the plan's, and the log's less the model's",
+         TORQUE_HEADER, torque_cells),
+    ):  # fmt: skip
+        click.echo(title)
+        print_rows(header, map(cells, answer["joints"]))
+    print_lines("Note", tuple(answer["notes"]))
+    for line in summary(answer):
+        click.echo(line)
+    print_files(answer["files"])

@@ -1,0 +1,127 @@
+"""Where the tip can be: inverse kinematics and the reach."""
+
+from typing import Any
+
+import click
+import numpy as np
+
+from boom_model import InfeasibleError, InputError, inverse_kinematics
+from planner.cli.options import boom_option, hold_option, json_option, load_boom, payload_option, pitch_option
+from planner.cli.printing import new_console, new_table, print_files, print_json
+from planner.targets import parse_hold, parse_pitch, unreachable
+
+
+@click.command(context_settings={"ignore_unknown_options": True})
+@click.argument("x", type=float)
+@click.argument("y", type=float)
+@click.argument("z", type=float)
+@pitch_option
+@hold_option
+@payload_option
+@boom_option
+@json_option
+def ik(x: float, y: float, z: float, pitch: str, hold: str, payload: float | None, boom_file: str | None, as_json: bool) -> int:
+    """Every joint position that puts the tip at X Y Z (m, in the base frame).
+
+    \b
+    Example:
+      boom ik 1.4 0 1.0 --pitch down --hold extension=0.25
+    """
+    boom = load_boom(boom_file, payload)
+    angle, held, position = parse_pitch(pitch), parse_hold(hold), (x, y, z)
+    found = inverse_kinematics(boom, position, angle, held)
+    reason = None if found.best is not None else unreachable(boom, position, angle, held)
+    if as_json:
+        answer: dict[str, Any] = {
+            "target": {"position_m": position, "pitch_rad": found.pitch, "hold": str(held)},
+            "solutions": [
+                {"q": s.q.tolist(), "within_limits": s.within_limits, "reasons": list(s.reasons)} for s in found.solutions
+            ],
+            "best": found.best,
+        }
+        print_json(answer if reason is None else answer | {"reason": reason})
+    elif found.solutions:
+        table = new_table("branch", "yaw deg", "inner deg", "lower deg", "extension m", "wrist deg", "within limits", "reasons")
+        for i, s in enumerate(found.solutions):
+            q = np.where([0, 0, 0, 1, 0], s.q, np.degrees(s.q))
+            best = " (best)" if i == found.best else ""
+            table.add_row(
+                f"{i + 1}{best}",
+                *(f"{v:.4f}" for v in q),
+                "yes" if s.within_limits else "no",
+                "\n".join(s.reasons) or "-",
+            )
+        new_console().print(table)
+    if reason is not None:
+        raise InfeasibleError(reason)
+    return 0
+
+
+@click.command()
+@pitch_option
+@hold_option
+@payload_option
+@click.option("--out", default="reach.png", show_default=True, metavar="FILE.png|FILE.rrd", help="The picture or recording.")
+@boom_option
+@json_option
+def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str | None, as_json: bool) -> int:
+    """What the tip reaches in the arm's vertical plane, and with what torque to spare.
+
+    \b
+    Example:
+      boom reach --hold least-torque --payload 8 --out reach.png
+    """
+    from boom_model.reach import reach_map
+
+    if not out.endswith((".png", ".rrd")):
+        raise InputError(f"{out}: a reach map is written as .png or .rrd")
+    boom, angle, held = load_boom(boom_file, payload), parse_pitch(pitch), parse_hold(hold)
+    if angle is None:
+        raise InputError("pitch free: a reach map is drawn for one pitch")
+    found = reach_map(boom, held, angle)
+    row, column = np.nonzero(found.within_limits)
+    answer: dict[str, Any] = {
+        "hold": str(held),
+        "pitch_rad": angle,
+        "payload_kg": boom.payload.mass,
+        "cells": found.exists.size,
+        "exists": int(found.exists.sum()),
+        "within_limits": len(row),
+        "overloaded": int((found.torque_margin < 0.0).sum()),
+        "files": {},
+    }
+    if not len(row):
+        reason = f"no tip position with pitch {np.degrees(angle):.4g} deg and hold {held} is within the limits"
+        if as_json:
+            print_json(answer | {"reason": reason})
+        raise InfeasibleError(reason)
+    margin = found.torque_margin[row, column]
+    known = bool(np.isfinite(margin).all())
+    answer |= {
+        "largest_r_m": float(np.abs(found.r[column]).max()),
+        "lowest_z_m": float(found.z[row].min()),
+        "highest_z_m": float(found.z[row].max()),
+        "least_torque_margin": float(margin.min()) if known else None,
+        "largest_torque_margin": float(margin.max()) if known else None,
+    }
+    if out.endswith(".png"):
+        from planner.reach_picture import reach_title, write_reach_picture
+
+        write_reach_picture(out, boom, found, reach_title(boom, found))
+        answer["files"] = {"picture": out}
+    else:
+        from planner.recording import write_reach_recording
+
+        write_reach_recording(out, boom, found)
+        answer["files"] = {"recording": out}
+    if as_json:
+        print_json(answer)
+        return 0
+    click.echo(
+        f"{answer['within_limits']} of {answer['cells']} cells are reached within the limits: r up to "
+        f"{answer['largest_r_m']:.2f} m, z from {answer['lowest_z_m']:.2f} to {answer['highest_z_m']:.2f} m"
+    )
+    if known:
+        click.echo(f"torque margin {margin.min():.3f} to {margin.max():.3f}; {answer['overloaded']} cells overload a drive")
+    print_files(answer["files"])
+    return 0

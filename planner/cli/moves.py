@@ -1,0 +1,327 @@
+"""Jobs on one move: plan it, compare its profiles, its torques, and the checks of any motion."""
+
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from boom_model import Boom, InfeasibleError, InputError
+from planner.cli.options import (
+    boom_option,
+    check_picture,
+    check_report,
+    hold_option,
+    json_option,
+    load_boom,
+    payload_as_option,
+    payload_option,
+    picture_option,
+    pitch_option,
+    report_option,
+    vehicle_option,
+)
+from planner.cli.printing import ANSWER_IS_NO, print_files, print_json, print_lines, print_report, print_rows, tracked
+from planner.targets import parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target
+
+if TYPE_CHECKING:
+    from boom_model.arrays import Array
+    from planner.report import Report
+    from planner.trajectory import Trajectory
+
+
+@click.command(context_settings={"ignore_unknown_options": True})  # so that -0.5 is a number
+@click.argument("start")
+@click.argument("goal")
+@click.option(
+    "--profile", type=click.Choice(["cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal"]), default="cubic",
+    show_default=True, help="How the path is timed.",
+)  # fmt: skip
+@click.option("--via", multiple=True, metavar="TARGET", help="A target on the way, with a stop; may be given again.")
+@click.option("--pass-via", is_flag=True, help="Go through the targets on the way on a smooth path, without a stop.")
+@click.option(
+    "--via-velocity", multiple=True, metavar="DEG/S,DEG/S,DEG/S,M/S,DEG/S",
+    help="The cubic's velocity at each --via, in turn, without a stop; else its acceleration is continuous there.",
+)  # fmt: skip
+@click.option(
+    "--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z",
+    help="What goes straight: the joints, or the tip from tip target to tip target; or an arc of the tip through a point.",
+)  # fmt: skip
+@click.option("--duration", type=float, metavar="S", help="Else the least that the limits allow.")
+@click.option("--jerk-bound", is_flag=True, help="Hold the time-optimal profile to the jerk limits as well.")
+@click.option("--average-torque", is_flag=True, help="Hold the time-optimal profile to the gearboxes' average torque as well.")
+@click.option("--rate", type=float, metavar="HZ", help="Sample at a controller's rate; the move ends on its clock.")
+@pitch_option
+@hold_option
+@payload_option
+@click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
+@click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
+@report_option
+@picture_option
+@vehicle_option
+@click.option("--show-reach", is_flag=True, help="Draw in the recording what the tip reaches under --pitch and --hold.")
+@boom_option
+@json_option
+def plan(
+    start: str,
+    goal: str,
+    profile: str,
+    via: tuple[str, ...],
+    pass_via: bool,
+    via_velocity: tuple[str, ...],
+    along: str,
+    duration: float | None,
+    jerk_bound: bool,
+    average_torque: bool,
+    rate: float | None,
+    pitch: str,
+    hold: str,
+    payload: float | None,
+    out: str,
+    csv_file: str | None,
+    picture: str | None,
+    document: str | None,
+    vehicle: str | None,
+    show_reach: bool,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Plan a move, check it against limits and drives, and record it.
+
+    START and GOAL are a named pose (transport, phenotyping), a joint position q=YAW,INNER,LOWER,EXTENSION,WRIST, or a tip
+    target tip=X,Y,Z.
+
+    \b
+    Examples:
+      boom plan transport phenotyping
+      boom plan transport tip=1.4,0,1.0 --hold extension=0.25 --profile time-optimal
+      boom plan tip=1,1.7,0.9 tip=-1,1.7,0.9 --along line --profile jerk-limited
+      boom plan transport phenotyping --via q=40,60,120,0.3,0 --pass-via --profile time-optimal --jerk-bound --rate 250
+    """
+    from planner.files import check_writable
+    from planner.planning import plan as plan_move
+    from planner.remedies import remedies
+    from planner.trajectory import write_csv
+    from planner.vehicle import load_case
+
+    boom = load_boom(boom_file, payload)
+    case = None if vehicle is None else load_case(vehicle)
+    check_picture(picture)
+    check_report(document)
+    check_writable(out, csv_file, picture, document)
+    if show_reach and parse_pitch(pitch) is None:
+        raise InputError("pitch free: the reach is drawn for one pitch")
+    targets = parse_target(start), parse_target(goal)
+    options: dict[str, Any] = {
+        "profile": profile,
+        "duration": duration,
+        "pitch": parse_pitch(pitch),
+        "hold": parse_hold(hold),
+        "via": [parse_target(text) for text in via],
+        "stop_at_via": not pass_via,
+        "via_velocities": [parse_joint_velocity(text) for text in via_velocity] or None,
+        "along": parse_along(along),
+        "jerk_bound": jerk_bound,
+        "average_torque": average_torque,
+        "vehicle": case,
+        "rate": rate,
+    }
+    try:
+        move = plan_move(boom, *targets, **options)
+    except InfeasibleError as error:
+        mend = [remedy.sentence for remedy in remedies(boom, *targets, tracked("looking for what would mend it"), **options)]
+        if as_json:
+            failed: dict[str, Any] = {"profile": profile, "duration_s": None, "verdict": "FAIL", "checks": [], "files": {}}
+            print_json({**failed, "reason": str(error), "remedies": mend})
+        print_lines("Would mend it" if not as_json else None, mend)
+        raise
+    report = move.report
+    if report.verdict == "FAIL":
+        found = remedies(boom, *targets, tracked("looking for what would mend it"), **options)
+        report = replace(report, remedies=tuple(remedy.sentence for remedy in found))
+    from planner.recording import write_recording
+
+    reach = None
+    if show_reach:
+        from boom_model.reach import reach_map
+
+        reach = reach_map(boom, options["hold"], options["pitch"])
+    written = {"recording": out}
+    write_recording(out, move, reach=reach)
+    if csv_file is not None:
+        write_csv(move.trajectory, csv_file, move.loads.tau)
+        written["csv"] = csv_file
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        write_drive_picture(picture, boom, move.trajectory, move.loads.tau, report)
+        written["picture"] = picture
+    _write_report(document, report, boom, move.trajectory, move.loads.tau, written)
+    return print_report(report, written, as_json)
+
+
+@click.command(context_settings={"ignore_unknown_options": True})
+@click.argument("start")
+@click.argument("goal")
+@click.option("--via", multiple=True, metavar="TARGET", help="A target on the way, with a stop; may be given again.")
+@click.option("--pass-via", is_flag=True, help="Go through the targets on the way on a smooth path, without a stop.")
+@pitch_option
+@hold_option
+@payload_option
+@click.option("--out", metavar="FILE.rrd", help="A recording of all of them over each other, for `boom view`.")
+@boom_option
+@json_option
+def profiles(
+    start: str,
+    goal: str,
+    via: tuple[str, ...],
+    pass_via: bool,
+    pitch: str,
+    hold: str,
+    payload: float | None,
+    out: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Every profile on one move, side by side: duration, worst ratio to each limit, worst stop.
+
+    \b
+    Example:
+      boom profiles transport phenotyping --payload 20 --out profiles.rrd
+    """
+    from planner.files import check_writable
+    from planner.profile_table import HEADER, cells, profile_markdown, profile_moves, profile_rows
+
+    check_writable(out)
+    moves = profile_moves(
+        load_boom(boom_file, payload),
+        parse_target(start),
+        parse_target(goal),
+        tracked("planning with each profile"),
+        via=[parse_target(text) for text in via],
+        stop_at_via=not pass_via,
+        pitch=parse_pitch(pitch),
+        hold=parse_hold(hold),
+    )
+    rows = profile_rows(moves)
+    written: dict[str, str] = {}
+    if out is not None:
+        from planner.recording import write_moves_recording
+
+        write_moves_recording(out, moves, profile_markdown(rows))
+        written["recording"] = out
+    if as_json:
+        print_json({"profiles": [asdict(row) for row in rows], "files": written})
+    else:
+        print_rows(HEADER, map(cells, rows))
+        print_files(written)
+    return ANSWER_IS_NO if any(row.verdict == "FAIL" for row in rows) else 0
+
+
+@click.command()
+@click.argument("motion", metavar="IN")
+@click.option("--out", required=True, metavar="OUT", help="The motion with its torques: .csv, .parquet, .yaml or .json.")
+@payload_option
+@payload_as_option
+@boom_option
+@json_option
+def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
+    """Inverse dynamics of a motion: the torque of each joint at each sample, with its friction where the boom's file gives it.
+
+    IN is a CSV or Parquet file that holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
+
+    \b
+    Example:
+      boom torque move.csv --out torques.csv --payload 8
+    """
+    from boom_model import JOINTS
+    from planner.motion_files import form_of, read_motion, write_motion
+    from planner.planning import torques
+
+    form = form_of(out)
+    boom, trajectory = load_boom(boom_file, payload), read_motion(motion)
+    tau = torques(boom, trajectory, payload_as)
+    write_motion(trajectory, out, tau)
+    at = np.abs(tau).argmax(axis=0)
+    peaks = [
+        {"joint": joint, "tau": float(tau[k, i]), "unit": "N" if i == 3 else "Nm", "at_s": float(trajectory.t[k])}
+        for i, (joint, k) in enumerate(zip(JOINTS, at, strict=True))
+    ]
+    if as_json:
+        print_json({"peaks": peaks, "notes": list(trajectory.notes), "files": {form[1:]: out}})
+        return 0
+    print_rows(
+        ("joint", "peak", "at"),
+        [(str(peak["joint"]), f"{peak['tau']:.3f} {peak['unit']}", f"{peak['at_s']:.3f} s") for peak in peaks],
+    )
+    print_lines("Note", trajectory.notes)
+    click.echo(f"{form[1:]}: {out}")
+    return 0
+
+
+@click.command()
+@click.argument("motion", metavar="IN")
+@payload_option
+@payload_as_option
+@vehicle_option
+@click.option("--out", metavar="FILE.rrd", help="A recording of the motion, for `boom view`.")
+@report_option
+@picture_option
+@boom_option
+@json_option
+def check(
+    motion: str,
+    payload: float | None,
+    payload_as: Any,
+    vehicle: str | None,
+    out: str | None,
+    picture: str | None,
+    document: str | None,
+    boom_file: str | None,
+    as_json: bool,
+) -> int:
+    """Hold any motion against the joint limits and the drives' datasheets. IN is a CSV or Parquet file.
+
+    \b
+    Example:
+      boom plan transport phenotyping --csv move.csv
+      boom check move.csv --payload 8 --out checked.rrd
+    """
+    from planner.files import check_writable
+    from planner.motion_files import read_motion
+    from planner.planning import examine
+    from planner.vehicle import load_case
+
+    check_report(document)
+    check_picture(picture)
+    check_writable(out, document, picture)
+    boom, trajectory = load_boom(boom_file, payload), read_motion(motion)
+    case = None if vehicle is None else load_case(vehicle)
+    move = examine(boom, trajectory, payload_as=payload_as, vehicle=case)
+    written: dict[str, str] = {}
+    if out is not None:
+        from planner.recording import write_recording
+
+        write_recording(out, move)
+        written["recording"] = out
+    _write_report(document, move.report, boom, trajectory, move.loads.tau, written)
+    if picture is not None:
+        from planner.drive_pictures import write_drive_picture
+
+        write_drive_picture(picture, boom, trajectory, move.loads.tau, move.report)
+        written["picture"] = picture
+    return print_report(move.report, written, as_json)
+
+
+def _write_report(
+    document: str | None, report: "Report", boom: Boom, motion: "Trajectory", tau: "Array", written: dict[str, str]
+) -> None:
+    from planner.document import write_document
+    from planner.drive_pictures import drive_pages
+    from planner.move_pictures import move_pictures
+
+    if document is not None:
+        write_document(
+            document, report.to_markdown(), move_pictures(boom, motion, tau) | drive_pages(boom, motion, tau, report)
+        )
+        written["report"] = document

@@ -1,0 +1,79 @@
+"""Options that several commands share, and what they stand for."""
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from boom_model import Boom, InputError
+from planner.targets import HOLDS
+
+_CATALOGUE = "boom.catalogue"
+
+_boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; else the third generation.")
+_catalogue_option = click.option(
+    "--catalogue",
+    metavar="FILE.toml",
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({_CATALOGUE: value}),
+    help="Motors, gearboxes and actuators of your own, beside the shipped ones.",
+)
+
+
+def boom_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """--boom, and --catalogue, which `load_boom` finds in the context: whoever names a drive may have brought it."""
+    return _boom_option(_catalogue_option(command))
+
+
+payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; else the boom's own.")
+payload_as_option = click.option(
+    "--payload-as", type=click.Choice(["mass", "force"]), default="mass", show_default=True,
+    help="Accelerate the payload with the tip, or hang its weight there and leave out its inertia, as the thesis does.",
+)  # fmt: skip
+json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
+report_option = click.option(
+    "--report", "document", metavar="FILE.md|.html|.pdf", help="The report as a document, with pictures, versions and command."
+)
+vehicle_option = click.option(
+    "--vehicle",
+    metavar="CASE",
+    help="What the vehicle does meanwhile: slope, track, shock, ditch or a FILE.toml; else it rests.",
+)
+picture_option = click.option("--picture", metavar="FILE.png", help="The drives as a page of pictures.")
+pitch_option = click.option(
+    "--pitch",
+    default="down",
+    show_default=True,
+    metavar="down|level|up|free|DEG",
+    help="Elevation of the end effector at a tip target; free lets the hold choose it.",
+)
+hold_option = click.option(
+    "--hold",
+    default="horizontal",
+    show_default=True,
+    metavar="HOLD",
+    help=f"Extra constraint of a tip target: {HOLDS}.",
+)
+
+
+def given_catalogue() -> str | None:
+    """What --catalogue names."""
+    name: str | None = click.get_current_context().meta.get(_CATALOGUE)
+    return name
+
+
+def load_boom(boom_file: str | None, payload: float | None = None) -> Boom:
+    boom = Boom.load(boom_file, given_catalogue())
+    return boom if payload is None else boom.with_payload(payload)
+
+
+def check_picture(picture: str | None) -> None:
+    if picture is not None and not picture.endswith(".png"):
+        raise InputError(f"{picture}: the drives' page is written as .png")
+
+
+def check_report(document: str | None) -> None:
+    from planner.document import require_form
+
+    if document is not None:
+        require_form(document)
