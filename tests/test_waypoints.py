@@ -132,7 +132,7 @@ def test_chosen_velocities_hold_in_a_given_duration_and_on_a_controllers_clock()
     for move in (longer, clocked):
         (motion,) = move.motions
         np.testing.assert_allclose(motion.path(motion.path.spline.x[1:-1], 1) / motion.duration, VELOCITIES, rtol=1e-12)
-    with pytest.raises(InfeasibleError, match=r"duration 1 s is too short: the cubics need at least"):
+    with pytest.raises(InfeasibleError, match=r"duration 1 s is too short: with these velocities the cubics need at least"):
         plan(BOOM, START, GOAL, via=list(VIA), via_velocities=VELOCITIES, duration=1.0)
 
 
@@ -183,11 +183,11 @@ def test_velocities_beyond_a_joints_limit_are_refused_with_segment_and_joint():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"via_velocities": VELOCITIES[:1]}, r"velocities have shape \(1, 5\); with 2 waypoints .* \(2, 5\)"),
+        ({"via_velocities": VELOCITIES[:1]}, r"velocities have shape \(1, 5\); with 2 waypoints, .* \(2, 5\)"),
         ({"via_velocities": VELOCITIES[:, :4]}, r"via_velocities has shape \(2, 4\)"),
         ({"via_velocities": VELOCITIES * np.nan}, r"via_velocities\[0, 0\] is nan"),
         ({"via_velocities": VELOCITIES, "profile": "quintic"}, "for the cubic profile, not for quintic"),
-        ({"via_velocities": VELOCITIES, "via": []}, r"with 0 waypoints without a stop it must be \(0, 5\)"),
+        ({"via_velocities": VELOCITIES, "via": []}, r"with 0 waypoints, .* \(0, 5\)"),
         ({"stop_at_via": False, "along": "line"}, "led by the joints, not by a line"),
         ({"jerk_bound": True}, "jerk_bound is for the time-optimal profile, not for cubic"),
         ({"average_torque": True, "profile": "jerk-limited"}, "average_torque is for the time-optimal profile"),
