@@ -7,16 +7,16 @@ import numpy as np
 
 from boom_model import JOINTS, BaseMotion, Boom, inverse_dynamics
 from boom_model.arrays import Array
-from planner.constraints import gear_ratio, motor_ratio
+from boom_model.drives import available_torque, motor_limit
+from planner.checks import average_torque as mean
+from planner.constraints import gear_ratio, looks, motor_ratio
 from planner.time_law import Motion
 
 RATIO_TOLERANCE = 1e-3
 """How far above 1 a ratio may be: what a planner may miss between the points that it looks at."""
 
-SAMPLES = 20_000
-"""Least number of samples of a motion: ten times the planner's finest grid, in each piece of its time law."""
-
-_EACH = 10
+FINER = 10
+"""A motion is certified at this many times the points that its planner looked at, and at both sides of every jump."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,8 @@ class WorstRatio:
     joint: str
     ratio: float
     """For a position: distance from the middle of its range over half the range; for the linkage: limit / angle."""
-    at_s: float
+    at_s: float | None
+    """None of what the whole motion decides."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,16 @@ class Certificate:
         return tuple(worst for worst in self.worst if worst.ratio > 1.0 + RATIO_TOLERANCE)
 
 
-def certify(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = None) -> Certificate:
+def certify(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = None, average_torque: bool = False) -> Certificate:
     """Positions, linkage, velocities, accelerations, jerks where they are limited, gearbox and motor torque.
 
-    Friction is counted. Only the base's tilt is: what else a vehicle does was not planned for.
+    Friction is counted. Only the base's tilt is: what else a vehicle does was not planned for. A motor whose supply is not
+    given is held against its torque at standstill, and the limit named so.
+
+    Args:
+        average_torque: whether the gearboxes' average torque was asked for too.
     """
-    parts = [motion.law.times(max(_EACH, -(-SAMPLES // (len(motion.law.s.x) - 1)))) for motion in motions]
+    parts = [motion.times(FINER * looks(motion.path)) for motion in motions]
     starts = np.cumsum([0.0, *(motion.duration for motion in motions)])
     t = np.concatenate([start + part for start, part in zip(starts[:-1], parts, strict=True)])
     states = zip(*(motion(part) for motion, part in zip(motions, parts, strict=True)), strict=True)
@@ -64,6 +69,8 @@ def certify(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = Non
     for limit, ratio in ratios.items():
         at, joint = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
         worst.append(WorstRatio(limit, JOINTS[joint], float(ratio[at, joint]), float(t[at])))
+    if average_torque:
+        worst += _averages(boom, t, qd, tau)
     laws = [motion.law for motion in motions]
     return Certificate(len(t), tuple(worst), sum(law.iterations for law in laws), max(law.residual for law in laws))
 
@@ -81,6 +88,20 @@ def _ratios(boom: Boom, q: Array, qd: Array, qdd: Array, qddd: Array | None, tau
     yield "acceleration", np.abs(qdd) / limits.acceleration
     if qddd is not None:
         yield "jerk", np.abs(qddd) / limits.jerk
-    for name, ratio in (("gearbox torque", gear_ratio(boom, tau)), ("motor torque", motor_ratio(boom, tau, qd, qdd))):
+    fed = all(
+        available_torque(drive, 0.0) is not None for drive in boom.drives if drive and motor_limit(drive, 0.0) is not None
+    )
+    motor = "motor torque" if fed else "motor torque at standstill"
+    for name, ratio in (("gearbox torque", gear_ratio(boom, tau)), (motor, motor_ratio(boom, tau, qd, qdd))):
         if ratio.any():
             yield name, ratio
+
+
+def _averages(boom: Boom, t: Array, qd: Array, tau: Array) -> list[WorstRatio]:
+    """The gearbox nearest to its average torque, or beyond it."""
+    ratios = []
+    for i, drive in enumerate(boom.drives):
+        limit = None if drive is None else drive.gearbox.max_average_torque
+        if limit is not None:
+            ratios.append(WorstRatio("average torque", JOINTS[i], (mean(t, tau[:, i], qd[:, i]) or 0.0) / limit, None))
+    return [max(ratios, key=lambda each: each.ratio)] if ratios else []

@@ -18,13 +18,14 @@ from boom_model.arrays import Array
 from boom_model.base_motion import BaseMotion
 from boom_model.boom import IS_LENGTH
 from boom_model.drives import drive_inertia, motor_limit
-from planner.path import Path
+from planner.path import JointLine, Path
 from planner.time_law import Motion, TimeLaw
 
 _LEAST_STRETCH_STEPS = 60
 _FINITE = 1e12
 _LEAST_SHARE = 1e-6
 _SLOPES = 20_001
+_LOOKS, _CURVED_LOOKS = 2001, 10_001
 
 
 class InfeasiblePathError(InfeasibleError):
@@ -159,13 +160,13 @@ def _largest_x(boom: Boom, p1: Array) -> Array:
     return bound
 
 
-def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None, samples: int = 2001) -> float:
+def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None, samples: int = _LOOKS) -> float:
     """The factor by which a law must be slowed (or may be hastened, below 1) to keep the limits along its path.
 
     Slowed by k, a law's u and x fall as 1/k^2: the joint limits give k at once, the drives' by bisection above it. Where a
     drive cannot even hold the load somewhere no slowness mends the move, and the joint limits alone decide.
     """
-    t = law.times(max(3, samples // (len(law.s.x) - 1)))
+    t = Motion(path, law).times(samples)
     demands = path_dynamics(boom, path, np.clip(np.asarray(law.s(t)), 0.0, 1.0), base)
     x, u = np.asarray(law.s(t, 1)) ** 2, np.asarray(law.s(t, 2))
     acceleration = np.abs(demands.p1 * u[:, None] + demands.p2 * x[:, None]) / boom.limits.acceleration
@@ -189,9 +190,14 @@ def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None 
 
 def jerk_stretch(boom: Boom, path: Path, law: TimeLaw, samples: int = 20_001) -> float:
     """The factor by which a law must be slowed to keep the joints' jerk limits; below 1 where it may be hastened."""
-    each = max(3, samples // (len(law.s.x) - 1))
-    _, _, _, qddd = Motion(path, law)(law.times(each))
+    motion = Motion(path, law)
+    _, _, _, qddd = motion(motion.times(samples))
     return float(np.cbrt((np.abs(qddd) / boom.limits.jerk).max()))
+
+
+def looks(path: Path) -> int:
+    """Points at which a planner looks at a motion along a path before it is certified."""
+    return _LOOKS if isinstance(path, JointLine) else _CURVED_LOOKS
 
 
 def path_limits(boom: Boom, path: Path) -> tuple[float, float, float]:

@@ -32,6 +32,11 @@ class Path(Protocol):
         """The derivative of the given order (0 to 3) with respect to s, shape (..., 5) for s of shape (...)."""
         ...
 
+    @property
+    def knots(self) -> Array:
+        """Where inside (0, 1) a derivative up to the third may jump."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class JointLine:
@@ -50,6 +55,10 @@ class JointLine:
             return line
         slope = self.goal - self.start if order == 1 else np.zeros(5)
         return np.broadcast_to(slope, (*s.shape[:-1], 5))
+
+    @property
+    def knots(self) -> Array:
+        return np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +140,10 @@ class TipPath:
         return np.asarray(self.spline(np.clip(s, 0.0, 1.0), order))
 
     @property
+    def knots(self) -> Array:
+        return np.empty(0)  # of a quintic spline the fourth derivative is continuous
+
+    @property
     def sentence(self) -> str:
         """What a report says of it."""
         kind = "line" if isinstance(self.curve, TipLine) else "arc"
@@ -147,6 +160,10 @@ class SplinePath:
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Array:
         return np.asarray(self.spline(np.clip(s, 0.0, 1.0), order))
+
+    @property
+    def knots(self) -> Array:
+        return np.asarray(self.spline.x[1:-1])
 
     @property
     def sentence(self) -> str:

@@ -37,6 +37,8 @@ from planner.vehicle import VehicleCase, base_motion
 CHECKS_PER_STEP = 10
 """A planned move is checked on a grid this many times finer than it is sampled."""
 
+_ROUNDING = 1e-9
+
 SHOCK_SAMPLES = 20
 """Samples that a shock must have for its peak to be seen, to 0.3 %."""
 
@@ -121,11 +123,14 @@ def plan(
         return _move(boom, timing.profile, vehicle, at_rest(q, (note,)), None, ())
     tilt = None if vehicle is None else BaseMotion.of(up=up_on_slope(vehicle.roll, vehicle.pitch))
     motions = timed(boom, paths, timing, tilt)
+    lasts = sum(motion.duration for motion in motions)
+    if rate is not None and duration is not None and lasts > duration * (1.0 + _ROUNDING):
+        notes = (*notes, f"lengthened from {duration:g} s to {lasts:g} s by the controller's clock")
     finer = step / CHECKS_PER_STEP
     if vehicle is not None and vehicle.peak != 0.0:
         finer = min(finer, vehicle.shock_duration / (2 * SHOCK_SAMPLES))
     coarse, fine = (joined([sample(motion, each) for motion in motions], notes) for each in (step, finer))
-    return _move(boom, timing.profile, vehicle, coarse, fine, motions, tilt)
+    return _move(boom, timing.profile, vehicle, coarse, fine, motions, tilt, average_torque)
 
 
 def plan_each_profile(boom: Boom, start: Target, goal: Target, track: Track = iter) -> list[Trajectory]:
@@ -254,11 +259,13 @@ def _move(
     fine: Trajectory | None,
     motions: tuple[Motion, ...],
     base: BaseMotion | None = None,
+    average_torque: bool = False,
 ) -> Move:
     loads, parts, _ = _loads(boom, trajectory, vehicle)
     report = check(boom, trajectory if fine is None else fine, profile=profile, vehicle=vehicle)
     if motions:
-        report = replace(report, certificate=certify(boom, motions, base), stop=worst_stop(boom, motions, base))
+        certificate = certify(boom, motions, base, average_torque)
+        report = replace(report, certificate=certificate, stop=worst_stop(boom, motions, base))
     return Move(boom, profile, trajectory, loads, parts, report, motions, vehicle)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from boom_model import Boom
+from boom_model import Boom, InfeasibleError
 from planner.constraints import jerk_stretch
 from planner.markdown import table
 from planner.planning import Move, plan
@@ -39,24 +39,36 @@ class ProfileRow:
 HEADER = ("profile", "duration", "velocity", "acceleration", "jerk", "gearbox", "motor torque", "motor speed", "worst stop")
 
 
-def profile_moves(boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any) -> dict[str, Move]:
-    """One move with every profile, the time-optimal one also with its jerk bounded, by name.
+def profile_moves(
+    boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any
+) -> tuple[dict[str, Move], dict[str, str]]:
+    """One move with every profile, the time-optimal one also with its jerk bounded, by name; and why the others cannot be.
 
     Args:
         track: iterates over the profiles, and may show how far it is.
         options: of `plan`, other than the profile's.
 
     Raises:
-        InputError, InfeasibleError: as `plan`.
+        InputError: as `plan`.
+        InfeasibleError: as `plan`, where no profile can make the move.
     """
     timings: list[tuple[str, dict[str, Any]]] = [(profile.value, {"profile": profile}) for profile in Profile]
     timings.append(("time-optimal, jerk bound", {"profile": Profile.TIME_OPTIMAL, "jerk_bound": True}))
-    return {name: plan(boom, start, goal, **timing, **options) for name, timing in track(timings)}
+    moves: dict[str, Move] = {}
+    refused: dict[str, str] = {}
+    for name, timing in track(timings):
+        try:
+            moves[name] = plan(boom, start, goal, **timing, **options)
+        except InfeasibleError as error:
+            refused[name] = str(error)
+    if not moves:
+        raise InfeasibleError(next(iter(refused.values())))
+    return moves, refused
 
 
 def profile_table(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[ProfileRow, ...]:
     """The rows of `profile_moves`, with the same arguments."""
-    return profile_rows(profile_moves(boom, start, goal, **options))
+    return profile_rows(profile_moves(boom, start, goal, **options)[0])
 
 
 def profile_rows(moves: Mapping[str, Move]) -> tuple[ProfileRow, ...]:

@@ -47,9 +47,11 @@ def remedies(boom: Boom, start: Target, goal: Target, track: Track = iter, **opt
         options: of `plan`.
     """
 
+    coarse = {**options, "step": _COARSE, "rate": None}
+
     def works(changed: Boom = boom, **other: Any) -> bool:
         try:
-            return plan(changed, start, goal, **{**options, "step": _COARSE, **other}).report.verdict is not Verdict.FAIL
+            return plan(changed, start, goal, **{**coarse, **other}).report.verdict is not Verdict.FAIL
         except InfeasibleError:
             return False
 

@@ -158,7 +158,7 @@ CERTIFICATE_HEADER = ("limit", "joint", "worst ratio", "at")
 
 def worst_cells(worst: WorstRatio) -> tuple[str, ...]:
     """A certificate's worst ratio for people, under CERTIFICATE_HEADER."""
-    return (worst.limit, worst.joint, f"{worst.ratio:.4f}", f"{worst.at_s:.2f} s")
+    return (worst.limit, worst.joint, f"{worst.ratio:.4f}", "-" if worst.at_s is None else f"{worst.at_s:.2f} s")
 
 
 PEAK_HEADER = ("joint", "at", "total", "gravity", "inertia", "velocity", "payload", "friction", "vehicle")

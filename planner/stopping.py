@@ -11,8 +11,8 @@ from boom_model.arrays import Array, Mask, scalar
 from boom_model.boom import LIMIT_TOLERANCE
 from boom_model.errors import InputError
 from planner.certificate import RATIO_TOLERANCE
-from planner.constraints import load_ratio, path_limits
-from planner.path import SplinePath
+from planner.constraints import load_ratio
+from planner.path import JointLine, SplinePath
 from planner.time_law import Motion, TimeLaw
 
 MOMENTS = 100
@@ -21,6 +21,8 @@ MOMENTS = 100
 _LOOKS = 33
 _TRIES = 7
 _WORTH_LEAVING = 0.8
+_MOST_SHARE = 8.0  # on a curved path the steepest place ahead may lie beyond the stop
+_SLOPES = 2001
 
 
 class Way(StrEnum):
@@ -96,15 +98,15 @@ def worst_stop(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = 
 
 def _stops(boom: Boom, motion: Motion, moments: Array, base: BaseMotion | None) -> list[Stop]:
     stops = [Stop(Motion(motion.path, motion.law.after(at)), Way.FINISH) for at in moments]
-    limits = path_limits(boom, motion.path)
+    limits = _limits_from(boom, motion, moments)
 
     def on_path(at: float, share: float) -> Motion | None:
-        return _path_brake(motion, at, share, limits)
+        return _path_brake(motion, at, share, limits[at])
 
     def off_path(at: float, share: float) -> Motion | None:
         return _joint_brake(boom, motion, at, share)
 
-    found = _hardest(boom, on_path, moments, base)
+    found = _hardest(boom, on_path, moments, base, most=1.0 if isinstance(motion.path, JointLine) else _MOST_SHARE)
     for i, (braked, _) in enumerate(found):
         if braked is not None and braked.duration < stops[i].duration:
             stops[i] = Stop(braked, Way.ON_PATH)
@@ -117,13 +119,13 @@ def _stops(boom: Boom, motion: Motion, moments: Array, base: BaseMotion | None) 
 
 
 def _hardest(
-    boom: Boom, brake: Callable[[float, float], Motion | None], moments: Array, base: BaseMotion | None
+    boom: Boom, brake: Callable[[float, float], Motion | None], moments: Array, base: BaseMotion | None, most: float = 1.0
 ) -> list[tuple[Motion | None, float]]:
     """The hardest braking of each moment that keeps the limits, and its share, by bisection of all moments at once."""
     found: list[Motion | None] = [None] * len(moments)
-    soft, hard = np.zeros(len(moments)), np.ones(len(moments))
-    share = hard
-    for _ in range(_TRIES):
+    soft, hard = np.zeros(len(moments)), np.full(len(moments), most)
+    share = np.ones(len(moments))
+    for _ in range(_TRIES if most == 1.0 else _TRIES + 2):
         tried = [brake(at, each) for at, each in zip(moments, share, strict=True)]
         kept = _kept(boom, tried, base)
         for i in np.flatnonzero(kept):
@@ -131,15 +133,25 @@ def _hardest(
         soft, hard = np.where(kept, share, soft), np.where(kept, hard, share)
         if (soft == hard).all():
             break
-        share = np.where(soft == hard, soft, (soft + hard) / 2.0)
+        share = np.where(soft == hard, soft, np.where(soft < 1.0, (soft + np.minimum(hard, 1.0)) / 2.0, np.sqrt(soft * hard)))
     return list(zip(found, soft.tolist(), strict=True))
 
 
-def _path_brake(motion: Motion, at: float, share: float, limits: tuple[float, float, float]) -> Motion | None:
+def _limits_from(boom: Boom, motion: Motion, moments: Array) -> dict[float, tuple[float, float]]:
+    """By moment, the least of the acceleration and jerk limits over |p'| on the rest of the path."""
+    s = np.linspace(0.0, 1.0, _SLOPES)
+    ahead = np.maximum.accumulate(np.abs(motion.path(s, 1))[::-1], axis=0)[::-1]
+    at = np.clip(np.searchsorted(s, np.asarray(motion.law.s(moments)), side="right") - 1, 0, _SLOPES - 1)
+    with np.errstate(divide="ignore"):
+        accelerations, jerks = ((limit / ahead[at]).min(axis=-1) for limit in (boom.limits.acceleration, boom.limits.jerk))
+    return dict(zip(moments.tolist(), zip(accelerations.tolist(), jerks.tolist(), strict=True), strict=True))
+
+
+def _path_brake(motion: Motion, at: float, share: float, limits: tuple[float, float]) -> Motion | None:
     """s(t) from a moment to rest with a share of the path's limits; None where it runs over the path's end."""
     law, unit = motion.law, motion.duration  # as in `jerk_limited`: ruckig wants numbers of order one
     state = [[float(law.s(at, order)) * unit**order] for order in range(3)]
-    found = _braked(state, [share * limits[1] * unit**2], [share * limits[2] * unit**3] if law.jerk_limited else None)
+    found = _braked(state, [share * limits[0] * unit**2], [share * limits[1] * unit**3] if law.jerk_limited else None)
     if found is None:
         return None
     braked = TimeLaw.from_pieces(found[0][0], found[0][1], jerk_limited=law.jerk_limited).stretched(unit)

@@ -13,6 +13,7 @@ from planner.path import Path
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
+_BESIDE = 1e-9  # relative; so near to a knot of the path that it stands for its side
 _LEFT_OF = 1e-12  # relative; so near to a piece's end that it stands for the end itself
 
 
@@ -117,6 +118,16 @@ class Motion:
     @property
     def duration(self) -> float:
         return self.law.duration
+
+    def times(self, samples: int) -> Array:
+        """At least that many times, equal within each piece of the law, with both sides of every jump of law and path."""
+        t = self.law.times(max(3, -(-samples // (len(self.law.s.x) - 1))))
+        passed = [self.law.s.solve(knot, extrapolate=False) for knot in self.path.knots]
+        if not passed:
+            return t
+        at = np.concatenate(passed)
+        beside = np.concatenate([at - _BESIDE * self.duration, at + _BESIDE * self.duration])
+        return np.sort(np.concatenate([t, np.clip(beside[np.isfinite(beside)], 0.0, self.duration)]))
 
     def __call__(self, t: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """q, qd, qdd and qddd at the times t, each (..., 5), by the chain rule; t outside the move is clipped to it.

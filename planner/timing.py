@@ -10,12 +10,11 @@ from boom_model import JOINTS, BaseMotion, Boom, InfeasibleError, InputError
 from boom_model.arrays import Array, scalar
 from planner.certificate import WorstRatio, certify
 from planner.clearance import require_path_clear
-from planner.constraints import jerk_stretch, least_stretch, shares
+from planner.constraints import jerk_stretch, least_stretch, looks, shares
 from planner.path import JointLine, Path, SplinePath
 from planner.time_law import Motion, TimeLaw
 
 _ROUNDING = 1e-9
-_FINE_SAMPLES = 40_001
 
 
 class Profile(StrEnum):
@@ -85,9 +84,11 @@ def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | 
     least = sum(motion.duration for motion in motions)
     asked = least if timing.duration is None else timing.duration
     if asked < least * (1.0 - _ROUNDING):
-        raise InfeasibleError(_too_short(boom, motions, timing.profile, asked, least, base))
+        raise InfeasibleError(_too_short(boom, motions, timing, asked, least, base))
     lengths = [motion.duration * max(1.0, asked / least) for motion in motions]
     if timing.rate is not None:
+        if timing.rate * least < 1.0:
+            raise InputError(f"rate is {timing.rate:g} Hz: one period is longer than the move, which takes {least:.4g} s")
         lengths = [np.ceil(length * timing.rate * (1.0 - _ROUNDING)) / timing.rate for length in lengths]
     return tuple(_slowed(motion, length / motion.duration) for motion, length in zip(motions, lengths, strict=True))
 
@@ -107,9 +108,10 @@ def _least(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> M
         motion = Motion(path, _law(boom, path, timing, base))
     if isinstance(path, JointLine) and timing.profile is not Profile.TIME_OPTIMAL:
         return motion
-    missed = least_stretch(boom, motion.path, motion.law, base, samples=_FINE_SAMPLES)
+    samples = looks(motion.path)
+    missed = least_stretch(boom, motion.path, motion.law, base, samples)
     if motion.law.jerk_limited:
-        missed = max(missed, jerk_stretch(boom, motion.path, motion.law, samples=_FINE_SAMPLES))
+        missed = max(missed, jerk_stretch(boom, motion.path, motion.law, samples))
     return _slowed(motion, max(1.0, missed))
 
 
@@ -155,7 +157,10 @@ def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, base: Ba
     count = len(path.waypoints) - 2 if isinstance(path, SplinePath) else 0
     if velocities is None or not isinstance(path, SplinePath) or velocities.shape != (count, 5):
         given = None if velocities is None else velocities.shape
-        raise InputError(f"velocities have shape {given}; with {count} waypoints without a stop it must be ({count}, 5)")
+        raise InputError(
+            f"velocities have shape {given}; with {count} waypoints, without those where the move already is, it must be "
+            f"({count}, 5)"
+        )
     motion = cubic_with_velocities(boom, path.waypoints, velocities, timing.duration, base)
     if timing.rate is not None:
         whole = float(np.ceil(motion.duration * timing.rate * (1.0 - _ROUNDING)) / timing.rate)
@@ -165,21 +170,25 @@ def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, base: Ba
 
 
 def _too_short(
-    boom: Boom, motions: Sequence[Motion], profile: Profile, asked: float, least: float, base: BaseMotion | None
+    boom: Boom, motions: Sequence[Motion], timing: Timing, asked: float, least: float, base: BaseMotion | None
 ) -> str:
     """How far a duration is from the least, and which limit it would break most."""
     hasty = [_slowed(motion, asked / least) for motion in motions]
-    worst = max(certify(boom, hasty, base).worst, key=lambda each: each.ratio)
-    parts = f" ({_parts(boom, hasty, worst, base)})" if worst.limit.endswith("torque") else ""
+    worst = max(certify(boom, hasty, base, timing.average_torque).worst, key=lambda each: each.ratio)
+    when = "" if worst.at_s is None else f" at {worst.at_s:.2f} s"
+    parts = f" ({_parts(boom, hasty, worst, base)})" if worst.limit in _INSTANT else ""
     return (
-        f"duration {asked:g} s is too short: the {profile} profile needs at least {least:.6g} s within the limits; in "
-        f"{asked:g} s {worst.joint} would reach {worst.ratio:.3g} times its {worst.limit} limit at {worst.at_s:.2f} s{parts}"
+        f"duration {asked:g} s is too short: the {timing.profile} profile needs at least {least:.6g} s within the limits; in "
+        f"{asked:g} s {worst.joint} would reach {worst.ratio:.3g} times its {worst.limit} limit{when}{parts}"
     )
+
+
+_INSTANT = ("gearbox torque", "motor torque", "motor torque at standstill")
 
 
 def _parts(boom: Boom, motions: Sequence[Motion], worst: WorstRatio, base: BaseMotion | None) -> str:
     """What the worst torque consists of."""
-    at = worst.at_s
+    at = worst.at_s or 0.0
     for motion in motions:
         if at <= motion.duration:
             break

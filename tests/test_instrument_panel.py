@@ -18,6 +18,7 @@ from boom_model.arrays import Array
 from boom_model.drives import STEPPER_MARGIN, available_torque
 from boom_model.frames import frame_transforms
 from boom_model.keep_out import Box, KeepOut
+from boom_model.linear_actuator import LinearActuator, LinearDrive
 from boom_model.provenance import Basis, Origin
 from planner import cli
 from planner.planning import Move, examine, plan
@@ -26,6 +27,7 @@ from planner.recording import write_moves_recording, write_recording
 from planner.recording.drive_plots import margin
 from planner.recording.palette import LIGHT
 from planner.recording.reach import boundary
+from planner.recording.torque_ratio import torque_ratios, worst_ratio
 from planner.report import cells
 from planner.vehicle import load_case
 
@@ -148,6 +150,14 @@ def test_ratio_of_every_drive_is_plotted_beside_its_limit(panel: Read, move: Mov
     assert panel.static("/plots/ratio", "SeriesLines:names") == ["inner", "lower", "limit"]
     np.testing.assert_allclose(values[:, :2].max(axis=1), ratio_by_datasheet(move.boom, move), rtol=1e-12)
     assert (values[:, 2] == 1.0).all()
+
+
+def test_an_actuators_force_counts_against_its_peak_force(move: Move):
+    sheet = LinearActuator("A", "this test", None, 50.0, *[None] * 8)
+    ratios = torque_ratios(replace(BOOM, actuator=LinearDrive(sheet)), move.trajectory, move.loads.tau)
+    assert list(ratios) == ["inner", "lower", "extension"]
+    np.testing.assert_allclose(ratios["extension"], np.abs(move.loads.tau[:, 3]) / 50.0, rtol=1e-15)
+    assert worst_ratio(ratios)[0] == ratios["extension"][0] > 1.0
 
 
 def test_without_drives_the_path_says_so(tmp_path: Path):
@@ -305,7 +315,7 @@ def test_every_view_says_its_unit(panel: Read):
 
 @pytest.fixture(scope="module")
 def moves() -> dict[str, Move]:
-    return profile_moves(BOOM, "transport", "phenotyping", step=0.05)
+    return profile_moves(BOOM, "transport", "phenotyping", step=0.05)[0]
 
 
 @pytest.fixture(scope="module")
@@ -397,9 +407,11 @@ def test_reach_is_recorded_by_the_command(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     at_rest = ("plan", "transport", "transport", "--show-reach")
     assert boom(monkeypatch, *at_rest, "--hold", "extension=0.25") == 0
-    assert "reach with hold extension 0.25" in Read(tmp_path / "move.rrd").titles()["/world"]
+    assert "; grey line: reach with hold extension=0.25 m, pitch -90 deg" in Read(tmp_path / "move.rrd").titles()["/world"]
     assert boom(monkeypatch, *at_rest, "--hold", "extension=5", "--out", "nothing.rrd") == 0
-    assert Read(tmp_path / "nothing.rrd").rows("/world/reach", "LineStrips3D:strips", static=True) == []
+    nothing = Read(tmp_path / "nothing.rrd")
+    assert "/world/reach" not in nothing.entities()
+    assert nothing.titles()["/world"].endswith("; nothing in reach with hold extension=5 m, pitch -90 deg")
     capsys.readouterr()
     assert boom(monkeypatch, *at_rest, "--pitch", "free") == 2
     assert capsys.readouterr().err == "boom: pitch free: the reach is drawn for one pitch\n"

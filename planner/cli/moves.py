@@ -21,7 +21,7 @@ from planner.cli.options import (
     report_option,
     vehicle_option,
 )
-from planner.cli.printing import ANSWER_IS_NO, print_files, print_json, print_lines, print_report, print_rows, tracked
+from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
 from planner.targets import parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target
 
 if TYPE_CHECKING:
@@ -111,6 +111,8 @@ def plan(
     check_writable(out, csv_file, picture, document)
     if show_reach and parse_pitch(pitch) is None:
         raise InputError("pitch free: the reach is drawn for one pitch")
+    if via_velocity and len(via_velocity) != len(via):
+        raise InputError(f"{len(via_velocity)} --via-velocity for {len(via)} --via; give one for each")
     targets = parse_target(start), parse_target(goal)
     options: dict[str, Any] = {
         "profile": profile,
@@ -193,7 +195,7 @@ def profiles(
     from planner.profile_table import HEADER, cells, profile_markdown, profile_moves, profile_rows
 
     check_writable(out)
-    moves = profile_moves(
+    moves, refused = profile_moves(
         load_boom(boom_file, payload),
         parse_target(start),
         parse_target(goal),
@@ -211,11 +213,15 @@ def profiles(
         write_moves_recording(out, moves, profile_markdown(rows))
         written["recording"] = out
     if as_json:
-        print_json({"profiles": [asdict(row) for row in rows], "files": written})
+        print_json({"profiles": [asdict(row) for row in rows], "refused": refused, "files": written})
     else:
         print_rows(HEADER, map(cells, rows))
         print_files(written)
-    return ANSWER_IS_NO if any(row.verdict == "FAIL" for row in rows) else 0
+    failed = [f"{row.profile}: a check FAILs" for row in rows if row.verdict == "FAIL"]
+    failed += [f"{name}: {reason}" for name, reason in refused.items()]
+    if failed:
+        complain("; ".join(failed))
+    return ANSWER_IS_NO if failed else 0
 
 
 @click.command()

@@ -58,7 +58,10 @@ def print_report(report: "Report", written: dict[str, str], as_json: bool) -> in
         console.print(f"{report.profile}, {report.duration:.3f} s", highlight=False)
         console.print(report.summary, style=STYLES.get(report.verdict), highlight=False, soft_wrap=True)
         print_files(written)
-    return ANSWER_IS_NO if report.verdict is Verdict.FAIL else 0
+    if report.verdict is not Verdict.FAIL:
+        return 0
+    complain(report.summary)
+    return ANSWER_IS_NO
 
 
 def print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -86,7 +86,8 @@ def cubic_with_velocities(
     if duration is not None:
         if duration < least:
             raise InfeasibleError(
-                f"duration {duration:g} s is too short: the cubics need at least {least:.6g} s within the limits"
+                f"duration {duration:g} s is too short: with these velocities the cubics need at least {least:.6g} s, in which "
+                "each segment already takes a joint or a drive to its limit"
             )
         lengths *= duration / least
     total = float(lengths.sum())

@@ -55,6 +55,8 @@ def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> 
 
 def log_boundary(recording: rr.RecordingStream, reach_map: ReachMap) -> None:
     """The boundary of what the tip reaches within the limits, in the arm's plane and yawing with it, to half a cell."""
+    if not reach_map.within_limits.any():
+        return
     strips = [np.stack([line[:, 0], np.zeros(len(line)), line[:, 1]], axis=-1) for line in boundary(reach_map)]
     lines = rr.LineStrips3D(strips, colors=[GREY], radii=[0.004])
     recording.log("world/reach", lines, rr.CoordinateFrame("base"), static=True)
@@ -62,7 +64,8 @@ def log_boundary(recording: rr.RecordingStream, reach_map: ReachMap) -> None:
 
 def boundary_sentence(reach_map: ReachMap) -> str:
     """What the boundary is, for a title."""
-    return f"grey line: reach with hold {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg"
+    line = "grey line: reach" if reach_map.within_limits.any() else "nothing in reach"
+    return f"{line} with hold {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg"
 
 
 def boundary(reach_map: ReachMap) -> list[Array]:

@@ -49,20 +49,17 @@ def log_tip_path(recording: rr.RecordingStream, positions: Array, worst: Array |
 
     Neighbours of one band share a strip.
     """
-    if worst is None or len(positions) == 1:
-        strips, colors = [positions], [UNKNOWN[1] if worst is None else _band_colors(worst)[0]]
+    if worst is None:
+        strips, colors = [positions], [UNKNOWN[1]]
     else:
-        band = np.searchsorted([bound for bound, _, _ in BANDS], np.maximum(worst[1:], worst[:-1]))
+        worse = np.maximum(worst[1:], worst[:-1]) if len(worst) > 1 else worst
+        band = np.searchsorted([bound for bound, _, _ in BANDS], worse)
         starts = np.concatenate([[0], np.flatnonzero(np.diff(band)) + 1])
         ends = np.append(starts[1:], len(band))
         strips = [positions[start : end + 1] for start, end in zip(starts, ends, strict=True)]
         colors = [BANDS[band[start]][2] for start in starts]
     path = rr.LineStrips3D(strips, colors=colors, radii=[0.006] * len(strips))
     recording.log("world/tip_path", path, rr.CoordinateFrame("mount"), static=True)
-
-
-def _band_colors(worst: Array) -> list[Color]:
-    return [BANDS[k][2] for k in np.searchsorted([bound for bound, _, _ in BANDS], worst)]
 
 
 def legend(known: bool) -> Legend:
