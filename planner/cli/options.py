@@ -63,16 +63,19 @@ def given_catalogue() -> str | None:
 
 
 def load_boom(boom_file: str | None, payload: float | None = None) -> Boom:
+    """The boom of --boom and --catalogue, with the payload of --payload."""
     boom = Boom.load(boom_file, given_catalogue())
     return boom if payload is None else boom.with_payload(payload)
 
 
 def check_picture(picture: str | None) -> None:
+    """Whether the drives' page can have that name, before the work."""
     if picture is not None and not picture.endswith(".png"):
         raise InputError(f"{picture}: the drives' page is written as .png")
 
 
 def check_report(document: str | None) -> None:
+    """Whether a report can have that name, before the work."""
     from planner.document import require_form
 
     if document is not None:

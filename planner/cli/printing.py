@@ -32,6 +32,7 @@ STYLES = {
 
 
 def print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:
+    """Prints a report as tables and sentences or as JSON; returns the exit code."""
     from planner.checks import Verdict
     from planner.report import CERTIFICATE_HEADER, PEAK_HEADER, cells, peak_cells, worst_cells
 
@@ -64,6 +65,7 @@ def print_report(report: "Report", written: dict[str, str], as_json: bool) -> in
 
 
 def print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Prints a table."""
     table = new_table(*header)
     for row in rows:
         table.add_row(*row)
@@ -71,21 +73,25 @@ def print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
 
 
 def print_lines(title: str | None, lines: Iterable[str]) -> None:
+    """Prints each line after its title; nothing without one."""
     for line in () if title is None else lines:
         click.echo(f"{title}: {line}")
 
 
 def print_files(written: Mapping[str, str]) -> None:
+    """Prints what was written, by kind."""
     for kind, name in written.items():
         click.echo(f"{kind}: {name}")
 
 
 def print_json(answer: dict[str, Any]) -> None:
+    """Prints one JSON object, even where --quiet is given."""
     out = click.get_current_context().meta.get(_LOUD, sys.stdout)
     click.echo(json.dumps(answer, allow_nan=False, indent=2), file=out)
 
 
 def complain(message: str) -> None:
+    """Prints one line on standard error."""
     click.echo(f"boom: {' '.join(message.split())}", err=True)
 
 
@@ -102,6 +108,7 @@ def tracked(title: str) -> Callable[[list[Any]], Iterable[Any]]:
 
 
 def is_quiet() -> bool:
+    """Whether --quiet is given."""
     return _LOUD in click.get_current_context().meta
 
 
@@ -114,6 +121,7 @@ def quieten(ctx: click.Context, _: click.Parameter, quiet: bool) -> None:
 
 
 def new_console() -> "Console":
+    """A console as wide as the terminal, or of a fixed width in a pipe."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() else _PIPE_WIDTH
@@ -121,6 +129,7 @@ def new_console() -> "Console":
 
 
 def new_table(*columns: str) -> "Table":
+    """An empty table with these columns."""
     from rich.box import SIMPLE
     from rich.table import Table
 
