@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from boom_model import JOINTS, Boom
+from boom_model import JOINTS, BaseMotion, Boom, Friction, up_on_slope
 from planner import JointLine, Motion, Profile, Verdict, certify, plan
 from planner.timing import Timing, timed
 from tests.limits import DRIVEN, EFFICIENCY, INERTIA, START_STOP, held, motor_allows, times
@@ -107,3 +107,51 @@ def test_a_load_that_no_drive_holds_is_broken_on_every_profile_that_plans_it():
         broken = {each.limit: each for each in certify(heavy, motions).broken}
         assert broken["motor torque"].joint == "lower"
         assert broken["motor torque"].ratio >= held(heavy, GOAL[None]) * (1.0 - 1e-12) > 1.1
+
+
+def test_the_jump_of_the_jerk_at_a_waypoint_is_seen():
+    """The third derivative of the path jumps there; a grid in time alone looks past it."""
+    via = [np.array([0.7, 1.05, 2.1, 0.3, 0.0]), START]
+    move = plan(LIGHT, START, GOAL, via=via, stop_at_via=False, profile="time-optimal", jerk_bound=True)
+    (motion,) = move.motions
+    dense = np.abs(motion(np.linspace(0.0, motion.duration, 400_001))[3] / LIGHT.limits.jerk).max()
+    certified = {each.limit: each.ratio for each in move.report.certificate.worst}["jerk"]
+    assert dense <= 1.0 + 1e-4
+    assert certified >= dense - 1e-6
+
+
+def test_friction_and_tilt_are_counted():
+    rubbing = replace(LIGHT, friction=Friction(np.full(5, 30.0), np.full(5, 15.0), (None,) * 5))
+    tilt = BaseMotion.of(up=up_on_slope(np.radians(10.0), np.radians(5.0)))
+    (motion,) = timed(LIGHT, [JointLine(START, GOAL)], Timing.of("quintic"), None)
+    t = times(motion, motion.duration / 1500)
+    q, qd, qdd, _ = motion(t)
+    still = pinocchio_inverse_dynamics(LIGHT, q, qd, qdd).tau
+    for boom, base, tau in (
+        (rubbing, None, still + 30.0 * qd + 15.0 * np.sign(qd)),
+        (LIGHT, tilt, pinocchio_inverse_dynamics(LIGHT, q, qd, qdd, base=tilt).tau),
+    ):
+        found = {each.limit: each.ratio for each in certify(boom, [motion], base).worst}
+        expected = np.abs(tau[:, list(DRIVEN)]).max() / START_STOP
+        assert found["gearbox torque"] == pytest.approx(expected, rel=2e-4)
+        assert abs(expected - np.abs(still[:, list(DRIVEN)]).max() / START_STOP) > 1e-3
+
+
+def test_average_torque_stands_in_the_certificate_where_it_is_asked_for():
+    (motion,) = timed(LIGHT, [JointLine(START, GOAL)], Timing.of("cubic"), None)
+    t = np.linspace(0.0, motion.duration, 20_001)
+    q, qd, qdd, _ = motion(t)
+    tau, speed = pinocchio_inverse_dynamics(LIGHT, q, qd, qdd).tau, np.abs(qd)
+    means = [np.cbrt(np.trapezoid(speed[:, i] * np.abs(tau[:, i]) ** 3, t) / np.trapezoid(speed[:, i], t)) for i in DRIVEN]
+    (found,) = (each for each in certify(LIGHT, [motion], average_torque=True).worst if each.limit == "average torque")
+    assert (found.joint, found.at_s) == (JOINTS[DRIVEN[int(np.argmax(means))]], None)
+    assert found.ratio == pytest.approx(max(means) / 275.0, rel=1e-6)
+    assert "average torque" not in {each.limit for each in certify(LIGHT, [motion]).worst}
+
+
+def test_a_motor_without_supply_is_held_against_its_standstill_and_the_limit_says_so():
+    bare = replace(LIGHT, drives=tuple(drive and replace(drive, bus_voltage=None) for drive in LIGHT.drives))
+    (motion,) = timed(LIGHT, [JointLine(START, GOAL)], Timing.of("cubic"), None)
+    limits = {each.limit for each in certify(bare, [motion]).worst}
+    assert "motor torque at standstill" in limits
+    assert "motor torque" not in limits

@@ -117,3 +117,31 @@ def test_a_moment_outside_the_motion_is_named(at):
     motion = motion_of(BARE, JointLine(*SINGLE), "trapezoidal")
     with pytest.raises(InputError, match="moment is"):
         stop(BARE, motion, at)
+
+
+def test_the_drives_bind_a_stop_where_the_joint_limits_do_not():
+    strong = replace(LIMITS, velocity=LIMITS.velocity * 2.0, acceleration=LIMITS.acceleration * 10.0)
+    boom = replace(BOOM.with_payload(22.0), limits=strong)
+    motion = motion_of(boom, JointLine(START, GOAL), "time-optimal")
+    binding = 0
+    for at in np.linspace(0.0, motion.duration, 12)[1:-1]:
+        found = stop(boom, motion, float(at))
+        ratios = worst(boom, found.motion, found.duration / 1000, jerk=False)
+        assert ratios.pop("outside") <= 2e-9
+        assert max(ratios.values()) <= 1.002
+        torque = max(value for name, value in ratios.items() if "torque" in name or name in ("motor", "gearbox"))
+        binding += found.way is not Way.FINISH and torque > 0.97 > max(ratios["velocity"], ratios["acceleration"])
+    assert binding >= 2
+
+
+def test_a_stop_on_a_curved_path_brakes_as_hard_as_the_way_ahead_allows():
+    """Not as the steepest place of the whole path would: some limit is met, or nearly, in most stops."""
+    motion = motion_of(BARE, through(BOOM, np.array([START, *VIA, GOAL])), "cubic")
+    reached = []
+    for at in np.linspace(0.0, motion.duration, 22)[1:-1]:
+        found = stop(BARE, motion, float(at))
+        if found.way is Way.ON_PATH:
+            ratios = worst(BARE, found.motion, found.duration / 1000, jerk=False)
+            reached.append(ratios["acceleration"])
+    assert len(reached) >= 8
+    assert np.median(reached) > 0.9
