@@ -135,7 +135,7 @@ def test_the_drives_bind_a_stop_where_the_joint_limits_do_not():
 
 
 def test_a_stop_on_a_curved_path_brakes_as_hard_as_the_way_ahead_allows():
-    """Not as the steepest place of the whole path would: some limit is met, or nearly, in most stops."""
+    """Not as the steepest place of the whole path would: each stop meets an acceleration limit."""
     motion = motion_of(BARE, through(BOOM, np.array([START, *VIA, GOAL])), "cubic")
     reached = []
     for at in np.linspace(0.0, motion.duration, 22)[1:-1]:
@@ -144,4 +144,4 @@ def test_a_stop_on_a_curved_path_brakes_as_hard_as_the_way_ahead_allows():
             ratios = worst(BARE, found.motion, found.duration / 1000, jerk=False)
             reached.append(ratios["acceleration"])
     assert len(reached) >= 8
-    assert np.median(reached) > 0.9
+    assert min(reached) > 0.98
