@@ -111,9 +111,10 @@ def plan(
     check_writable(out, csv_file, picture, document)
     if show_reach and parse_pitch(pitch) is None:
         raise InputError("pitch free: the reach is drawn for one pitch")
-    if via_velocity and len(via_velocity) != len(via):
-        raise InputError(f"{len(via_velocity)} --via-velocity for {len(via)} --via; give one for each")
     targets = parse_target(start), parse_target(goal)
+    velocities = [parse_joint_velocity(text) for text in via_velocity]
+    if velocities and len(velocities) != len(via):
+        raise InputError(f"{len(velocities)} --via-velocity for {len(via)} --via; give one for each")
     options: dict[str, Any] = {
         "profile": profile,
         "duration": duration,
@@ -121,7 +122,7 @@ def plan(
         "hold": parse_hold(hold),
         "via": [parse_target(text) for text in via],
         "stop_at_via": not pass_via,
-        "via_velocities": [parse_joint_velocity(text) for text in via_velocity] or None,
+        "via_velocities": velocities or None,
         "along": parse_along(along),
         "jerk_bound": jerk_bound,
         "average_torque": average_torque,
