@@ -22,10 +22,12 @@ _RPM = 2.0 * np.pi / 60.0
 
 # Wide enough for any drive that is built; beyond is a slip of units.
 _Text = Annotated[str, Field(min_length=1)]
-_Ratio = Annotated[float, Field(gt=0, le=1e4, allow_inf_nan=False)]
+_Ratio = Annotated[float, Field(ge=1, le=1e4, allow_inf_nan=False)]
 _Step = Annotated[float, Field(ge=0.1, le=90, allow_inf_nan=False)]
 _Angle = Annotated[float, Field(gt=0, le=90, allow_inf_nan=False)]
 _Percent = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+_Efficiency = Annotated[float, Field(ge=1, le=100, allow_inf_nan=False)]
+"""From 1 %: 0.65 is a share."""
 _Mass = Annotated[float, Field(ge=1e-3, le=1e4, allow_inf_nan=False)]
 _Torque = Annotated[float, Field(ge=1e-4, le=1e6, allow_inf_nan=False)]
 _Force = Annotated[float, Field(ge=1e-3, le=1e7, allow_inf_nan=False)]
@@ -122,7 +124,7 @@ class _GearboxTable(Table):
     start_stop_torque_Nm: _Torque | None = None
     max_average_torque_Nm: _Torque | None = None
     peak_torque_Nm: _Torque | None = None
-    efficiency_percent: _Percent | None = None
+    efficiency_percent: _Efficiency | None = None
     no_load_input_torque_Nm: _Torque | None = None
     starting_torque_Nm: _Torque | None = None
     backdrive_torque_Nm: _Torque | None = None
@@ -160,7 +162,7 @@ class _ActuatorTable(Table):
     max_speed_m_s: _Speed | None = None
     stroke_m: _Stroke | None = None
     lead_mm: _Lead | None = None
-    efficiency_percent: _Percent | None = None
+    efficiency_percent: _Efficiency | None = None
     backdrive_force_N: _Force | None = None
     duty_percent: _Percent | None = None
     mass_kg: _Mass | None = None

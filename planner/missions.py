@@ -105,8 +105,7 @@ class Mission:
     @property
     def jerk_limited(self) -> bool:
         """Whether a step is planned within the jerk limits."""
-        every = (step for _, step in _expanded(self.table.steps, ""))
-        return any(step.jerk_bound or step.profile == Profile.JERK_LIMITED for step in every)
+        return _jerk_limited(self.table.steps)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -299,6 +298,10 @@ def _expanded(steps: list[_Step], where: str) -> Iterator[tuple[str, _Step]]:
             yield from _expanded(part.steps, f"{name}, steps")
         if part.repeat is None:
             yield name, part
+
+
+def _jerk_limited(steps: list[_Step]) -> bool:
+    return any(step.jerk_bound or step.profile == Profile.JERK_LIMITED or _jerk_limited(step.steps) for step in steps)
 
 
 def _leg(

@@ -560,6 +560,8 @@ def test_a_body_of_another_mass_keeps_its_shape():
         pytest.param(
             "K1_Nm_per_mrad = 67", "K1_Nm_per_mrad = 67000", "gearboxes.CBG320160.torsion_K1_Nm_per_mrad", id="Nm/rad"
         ),
+        pytest.param("percent = 65", "percent = 0.65", "gearboxes.CBG320160.efficiency_percent", id="a share"),
+        pytest.param("ratio = 160", "ratio = 0.00625", "gearboxes.CBG320160.ratio", id="the other way round"),
         pytest.param('source = "Cone', 'source = ""  # "Cone', "gearboxes.CBG320160.source", id="no source"),
     ],
 )

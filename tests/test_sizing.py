@@ -240,6 +240,21 @@ def test_another_joint_that_cannot_is_named_as_what_stands_in_the_way(undersized
     assert any(note.startswith("inner: no motion was found with any drive") for note in sizing_notes((choice,), Adapt.REPLAN))
 
 
+def test_replanning_plans_on_the_slope_and_with_the_variant(undersized):
+    """Uphill with 22 kg a time-optimal move takes longer; and another payload's motion says nothing of the fitted drive."""
+    mission, slope, boom = undersized[0], load_case("slope"), BOOM.with_payload(22.0)
+    drive = boom.drives[2]
+    (level,), (tilted,) = (
+        size(boom, mission, "lower", [drive], adapt=Adapt.REPLAN, vehicle=vehicle) for vehicle in (None, slope)
+    )
+    assert tilted.moving == pytest.approx(plan_cycle(boom, mission, slope).duty.duration, rel=1e-12)
+    assert tilted.moving > 1.0005 * level.moving
+    light = replace(CATALOGUE, motors={"MST340B02": CATALOGUE.motors["MST340B02"]})
+    cycle, heavy = plan_cycle(BOOM, mission), {"payload=30": BOOM.with_payload(30.0)}
+    (choice,) = choose(heavy, cycle, ("lower",), light, adapt=Adapt.REPLAN)
+    assert choice.fitted.infeasible is not None
+
+
 @pytest.mark.parametrize("adapt", [Adapt.NOTHING, Adapt.RESCALE])
 def test_a_mission_without_a_motion_is_for_replanning_alone(undersized, adapt):
     with pytest.raises(InputError, match="mission quick has not been planned"):
