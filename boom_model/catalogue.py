@@ -3,21 +3,48 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from boom_model.drives import Gearbox, Motor, Winding
 from boom_model.errors import InputError
 from boom_model.linear_actuator import LinearActuator
-from boom_model.toml_file import Finite, Positive, Table, read_toml
+from boom_model.toml_file import Finite, Table, read_toml
 
 CATALOGUE_FILE = Path(str(files("boom_model") / "data" / "catalogue.toml"))
 
 _RPM = 2.0 * np.pi / 60.0
+
+# Wide enough for any drive that is built; beyond is a slip of units.
+_Text = Annotated[str, Field(min_length=1)]
+_Ratio = Annotated[float, Field(ge=1, le=1e4, allow_inf_nan=False)]
+_Step = Annotated[float, Field(ge=0.1, le=90, allow_inf_nan=False)]
+_Angle = Annotated[float, Field(gt=0, le=90, allow_inf_nan=False)]
+_Percent = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+_Efficiency = Annotated[float, Field(ge=1, le=100, allow_inf_nan=False)]
+"""From 1 %: 0.65 is a share."""
+_Mass = Annotated[float, Field(ge=1e-3, le=1e4, allow_inf_nan=False)]
+_Torque = Annotated[float, Field(ge=1e-4, le=1e6, allow_inf_nan=False)]
+_Force = Annotated[float, Field(ge=1e-3, le=1e7, allow_inf_nan=False)]
+_Current = Annotated[float, Field(ge=1e-2, le=1e3, allow_inf_nan=False)]
+_Resistance = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
+_Inductance = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
+_Voltage = Annotated[float, Field(ge=0.1, le=1e3, allow_inf_nan=False)]
+_RotorInertia = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
+_InputInertia = Annotated[float, Field(ge=1e-9, le=1.0, allow_inf_nan=False)]
+_Stiffness = Annotated[float, Field(ge=1e-3, le=1e4, allow_inf_nan=False)]
+"""[Nm/mrad]: 1e4 is several times the largest strain-wave gearbox; a figure in Nm/rad is mostly beyond."""
+_Play = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+_InputSpeed = Annotated[float, Field(ge=0.1, le=1e5, allow_inf_nan=False)]
+_Life = Annotated[float, Field(ge=1, le=1e7, allow_inf_nan=False)]
+_Speed = Annotated[float, Field(ge=1e-5, le=100, allow_inf_nan=False)]
+_Stroke = Annotated[float, Field(ge=1e-3, le=100, allow_inf_nan=False)]
+_Lead = Annotated[float, Field(ge=1e-2, le=1e4, allow_inf_nan=False)]
 
 
 @dataclass(frozen=True)
@@ -59,71 +86,86 @@ class Catalogue:
 
 
 class _WindingTable(Table):
-    current_A: Positive
-    resistance_ohm: Positive
-    inductance_mH: Positive
-    voltage_V: Positive | None = None
+    current_A: _Current
+    resistance_ohm: _Resistance
+    inductance_mH: _Inductance
+    voltage_V: _Voltage | None = None
 
 
 class _MotorTable(Table):
     """What no check uses (phase voltage, temperatures, shaft loads) stands in the file for its readers."""
 
-    source: str
-    tolerance_percent: Positive | None = None
-    step_deg: Positive
-    full_step_accuracy_deg: Positive | None = None
-    microstep_accuracy_deg: Positive | None = None
-    max_voltage_V: Positive | None = None
-    holding_torque_Nm: Positive | None = None
-    running_torque_Nm: Positive | None = None
-    mass_kg: Positive | None = None
-    rotor_inertia_kg_cm2: Positive | None = None
+    source: _Text
+    tolerance_percent: _Percent | None = None
+    step_deg: _Step
+    full_step_accuracy_deg: _Angle | None = None
+    microstep_accuracy_deg: _Angle | None = None
+    max_voltage_V: _Voltage | None = None
+    holding_torque_Nm: _Torque | None = None
+    running_torque_Nm: _Torque | None = None
+    mass_kg: _Mass | None = None
+    rotor_inertia_kg_cm2: _RotorInertia | None = None
     ambient_degC: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
     max_operating_degC: Finite | None = None
-    max_radial_load_kg: Positive | None = None
-    max_thrust_load_kg: Positive | None = None
+    max_radial_load_kg: _Mass | None = None
+    max_thrust_load_kg: _Mass | None = None
     parallel: _WindingTable | None = None
     series: _WindingTable | None = None
 
 
+_RATINGS = ("max_average_torque_Nm", "start_stop_torque_Nm", "peak_torque_Nm")
+"""Of a gearbox, none less than the one before."""
+
+
 class _GearboxTable(Table):
-    source: str
-    ratio: Positive
-    continuous_torque_Nm: Positive | None = None
-    start_stop_torque_Nm: Positive | None = None
-    max_average_torque_Nm: Positive | None = None
-    peak_torque_Nm: Positive | None = None
-    efficiency_percent: Annotated[float, Field(gt=0, le=100)] | None = None
-    no_load_input_torque_Nm: Positive | None = None
-    starting_torque_Nm: Positive | None = None
-    backdrive_torque_Nm: Positive | None = None
-    mass_kg: Positive | None = None
-    input_inertia_kg_m2: Positive | None = None
-    torsion_T1_Nm: Positive | None = None
-    torsion_T2_Nm: Positive | None = None
-    torsion_K1_Nm_per_mrad: Positive | None = None
-    torsion_K2_Nm_per_mrad: Positive | None = None
-    torsion_K3_Nm_per_mrad: Positive | None = None
-    backlash_mrad: Positive | None = None
-    hysteresis_mrad: Positive | None = None
-    max_input_speed_rpm: Positive | None = None
-    max_average_input_speed_rpm: Positive | None = None
-    rated_life_h: Positive | None = None
-    rated_input_speed_rpm: Positive | None = None
+    source: _Text
+    ratio: _Ratio
+    continuous_torque_Nm: _Torque | None = None
+    start_stop_torque_Nm: _Torque | None = None
+    max_average_torque_Nm: _Torque | None = None
+    peak_torque_Nm: _Torque | None = None
+    efficiency_percent: _Efficiency | None = None
+    no_load_input_torque_Nm: _Torque | None = None
+    starting_torque_Nm: _Torque | None = None
+    backdrive_torque_Nm: _Torque | None = None
+    mass_kg: _Mass | None = None
+    input_inertia_kg_m2: _InputInertia | None = None
+    torsion_T1_Nm: _Torque | None = None
+    torsion_T2_Nm: _Torque | None = None
+    torsion_K1_Nm_per_mrad: _Stiffness | None = None
+    torsion_K2_Nm_per_mrad: _Stiffness | None = None
+    torsion_K3_Nm_per_mrad: _Stiffness | None = None
+    backlash_mrad: _Play | None = None
+    hysteresis_mrad: _Play | None = None
+    max_input_speed_rpm: _InputSpeed | None = None
+    max_average_input_speed_rpm: _InputSpeed | None = None
+    rated_life_h: _Life | None = None
+    rated_input_speed_rpm: _InputSpeed | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "_GearboxTable":
+        given = [name for name in _RATINGS if getattr(self, name) is not None]
+        for low, high in pairwise(given):
+            if getattr(self, low) > getattr(self, high):
+                raise ValueError(f"{high} is {getattr(self, high):g}, less than {low}, which is {getattr(self, low):g}")
+        T1, T2 = self.torsion_T1_Nm, self.torsion_T2_Nm
+        if T1 is not None and T2 is not None and T1 >= T2:
+            raise ValueError(f"torsion_T1_Nm is {T1:g}; it must be below torsion_T2_Nm, which is {T2:g}")
+        return self
 
 
 class _ActuatorTable(Table):
-    source: str
-    rated_force_N: Positive | None = None
-    peak_force_N: Positive | None = None
-    static_force_N: Positive | None = None
-    max_speed_m_s: Positive | None = None
-    stroke_m: Positive | None = None
-    lead_mm: Positive | None = None
-    efficiency_percent: Annotated[float, Field(gt=0, le=100)] | None = None
-    backdrive_force_N: Positive | None = None
-    duty_percent: Annotated[float, Field(gt=0, le=100)] | None = None
-    mass_kg: Positive | None = None
+    source: _Text
+    rated_force_N: _Force | None = None
+    peak_force_N: _Force | None = None
+    static_force_N: _Force | None = None
+    max_speed_m_s: _Speed | None = None
+    stroke_m: _Stroke | None = None
+    lead_mm: _Lead | None = None
+    efficiency_percent: _Efficiency | None = None
+    backdrive_force_N: _Force | None = None
+    duty_percent: _Percent | None = None
+    mass_kg: _Mass | None = None
 
 
 class _CatalogueTable(Table):

@@ -23,8 +23,8 @@ from planner.duty import Duty, trapezoid_weights
 from planner.legs import legs
 from planner.planning import CHECKS_PER_STEP, check
 from planner.report import Report
-from planner.targets import TipTarget, parse_along, parse_hold, parse_pitch, parse_target, resolve
-from planner.timing import Timing, timed
+from planner.targets import TipTarget, parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target, resolve
+from planner.timing import Profile, Timing, timed
 from planner.tracking import Track
 from planner.trajectory import STEP, Trajectory, joined, sample
 from planner.vehicle import VehicleCase
@@ -40,6 +40,7 @@ class _Step(Table):
     to: str | None = None
     via: list[str] = Field(default_factory=list)
     pass_via: bool = False
+    via_velocity: list[str] = Field(default_factory=list)
     along: str = "joint"
     profile: str = "cubic"
     jerk_bound: bool = False
@@ -58,7 +59,7 @@ class _Step(Table):
         if len(given) != 1:
             raise ValueError(f"a step has one of to, hold_s, pause_s and repeat; this one has {', '.join(given) or 'none'}")
         allowed = {
-            "to": {"to", "via", "pass_via", "along", "profile", "jerk_bound", "average_torque", "duration_s", "pitch", "hold"},
+            "to": set(_Step.model_fields) - {"hold_s", "pause_s", "repeat", "steps"},
             "repeat": {"repeat", "steps"},
         }.get(given[0], {given[0]})
         stray = sorted(self.model_fields_set - allowed)
@@ -100,6 +101,11 @@ class Mission:
         """[m]"""
         tolerance = self.table.tip_tolerance_mm
         return None if tolerance is None else Sourced(tolerance * 1e-3, self.origin)
+
+    @property
+    def jerk_limited(self) -> bool:
+        """Whether a step is planned within the jerk limits."""
+        return _jerk_limited(self.table.steps)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -294,6 +300,10 @@ def _expanded(steps: list[_Step], where: str) -> Iterator[tuple[str, _Step]]:
             yield name, part
 
 
+def _jerk_limited(steps: list[_Step]) -> bool:
+    return any(step.jerk_bound or step.profile == Profile.JERK_LIMITED or _jerk_limited(step.steps) for step in steps)
+
+
 def _leg(
     boom: Boom, part: _Step, q: Array, vehicle: VehicleCase | None, step: float
 ) -> tuple[Leg | None, Array, tuple[str, ...]]:
@@ -312,10 +322,12 @@ def _move(
     along, target = parse_along(part.along), parse_target(str(part.to))
     by_joints = isinstance(along, str) and along == "joint"
     x, y, z = (float(v) for v in forward_kinematics(boom, q).position)
-    timing = Timing.of(part.profile, part.duration_s, part.jerk_bound, part.average_torque)
+    velocities = np.array([parse_joint_velocity(text) for text in part.via_velocity]) if part.via_velocity else None
+    timing = Timing.of(part.profile, part.duration_s, part.jerk_bound, part.average_torque, velocities)
     targets = (q if by_joints else TipTarget((x, y, z)), *(parse_target(text) for text in part.via), target)
     pitch, hold = parse_pitch(part.pitch), parse_hold(part.hold)
-    paths, said = legs(boom, targets, pitch, hold, along, not part.pass_via, reference=q)
+    stops = not part.pass_via and velocities is None
+    paths, said = legs(boom, targets, pitch, hold, along, stops, reference=q)
     if not paths:
         return None, q, ()
     tilt = None if vehicle is None else BaseMotion.of(up=up_on_slope(vehicle.roll, vehicle.pitch))

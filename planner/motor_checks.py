@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from boom_model import Basis, Drive, Origin, mesh_efficiency
+from boom_model import Basis, Drive, Motor, Origin, mesh_efficiency
 from boom_model.arrays import Array
 from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque, speed_for_torque
 from planner.joint_view import JointView
@@ -27,7 +27,7 @@ def motor_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     """Every motor row of a joint: hold, torque both ways and at no speed, speed, inertia, resonance, RMS, gearbox overload."""
     motor, gear = drive.motor, drive.gearbox
     hold, at = view.peak(view.static)
-    origin = Origin(Basis.PRINTED, f"{motor.source}; no credit for friction [own derivation]")
+    origin = Origin(Basis.PRINTED, f"{_sheet(motor)}; no credit for friction [own derivation]")
     yield view.held("motor hold", hold / gear.ratio, motor.holding_torque, "Nm", at, origin, STEPPER_MARGIN)
     yield from _torque_rows(view, drive)
     yield _inertia_row(view, drive)
@@ -43,8 +43,7 @@ def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     for check, tau, qd in directions:
         torque = motor_torque(drive, tau, qd, view.qdd)
         if torque is None:
-            why = f"{drive.motor.source}; {drive.gearbox.source}; efficiency, no-load torque or an inertia is not printed"
-            yield Row(view.joint, check, None, None, "Nm", None, STEPPER_MARGIN, None, Verdict.NOT_CHECKABLE, None, why)
+            yield from _unknown_torque_rows(view, drive, [check for check, *_ in directions])
             return
         demands.append(np.abs(torque))
         less = motor_torque(drive, tau, qd, view.qdd, no_load_in_efficiency=True)
@@ -56,8 +55,29 @@ def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     yield _motor_speed_row(view, drive, np.max(demands, axis=0))
     braked = drive.brake is not None and drive.brake.value  # without one the motor holds in a pause too
     driven = np.where(view.duty.powered, demands[0], 0.0) if braked else demands[0]
-    known = Origin(Basis.PRINTED, f"{drive.motor.source}; a stepper's heat goes with its current, not with its torque")
+    known = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; a stepper's heat goes with its current, not with its torque")
     yield view.told("motor RMS torque", view.duty.mean(driven**2) ** 0.5, "Nm", None, known)
+
+
+def _unknown_torque_rows(view: JointView, drive: Drive, directions: list[str]) -> Iterator[Row]:
+    """What cannot be said of a motor whose torque is not known; how fast it turns is."""
+    for check in directions:
+        yield _unknown_torque_row(view, drive, check)
+    yield _quasi_static_row(view, drive)
+    unknown = Origin(Basis.PRINTED, _unknown_torque(drive))
+    yield view.told("motor torque, other reading", None, "Nm", None, unknown)
+    fastest, at = view.peak(view.qd)
+    yield view.held("motor speed", drive.gearbox.ratio * fastest, None, "rad/s", at, unknown)
+    yield view.told("motor RMS torque", None, "Nm", None, unknown)
+
+
+def _unknown_torque_row(view: JointView, drive: Drive, check: str) -> Row:
+    why = _unknown_torque(drive)
+    return Row(view.joint, check, None, None, "Nm", None, STEPPER_MARGIN, None, Verdict.NOT_CHECKABLE, None, why)
+
+
+def _unknown_torque(drive: Drive) -> str:
+    return f"{_sheet(drive.motor)}; {drive.gearbox.source}; efficiency, no-load torque or an inertia is not printed"
 
 
 def _motor_torque_row(view: JointView, drive: Drive, check: str, torque: Array) -> Row:
@@ -66,13 +86,13 @@ def _motor_torque_row(view: JointView, drive: Drive, check: str, torque: Array) 
     speed = drive.gearbox.ratio * np.abs(view.qd)
     running = motor.running_torque
     curve = available_torque(drive, speed)
-    slow = Origin(Basis.PRINTED, f"{motor.source}, running torque")
+    slow = Origin(Basis.PRINTED, f"{_sheet(motor)}, running torque")
     if running is None or (curve is None and (speed > LOW_SPEED).any()):
         most, at = view.peak(torque)
         if running is not None and most * (1.0 + STEPPER_MARGIN - SAMPLING_SLACK) > running:
             # no supply makes a motor stronger than its running torque
             return view.held(check, most, running, "Nm", at, slow, STEPPER_MARGIN)
-        unknown = Origin(Basis.PRINTED, f"{motor.source}; above low speed only with bus voltage and wiring")
+        unknown = Origin(Basis.PRINTED, f"{_sheet(motor)}; above low speed only with bus voltage and wiring")
         return view.held(check, most, None, "Nm", at, unknown, STEPPER_MARGIN)
     available = np.full_like(torque, running) if curve is None else curve
     on_curve = available < running * (1.0 - SAMPLING_SLACK)
@@ -93,14 +113,15 @@ def _severity(row: Row) -> tuple[int, float]:
 def _quasi_static_row(view: JointView, drive: Drive) -> Row:
     """The limit of moving ever more slowly, either way, through the poses: lifting the worst of them at no speed."""
     load, at = view.peak(np.abs(view.static) + view.coulomb)
-    torque = motor_torque(drive, load, 1.0, 0.0)
+    torque, check = motor_torque(drive, load, 1.0, 0.0), "motor torque, quasi-static"
+    if torque is None:
+        return _unknown_torque_row(view, drive, check)
     running, curve = drive.motor.running_torque, available_torque(drive, 0.0)
     limit = running if curve is None else float(curve)
     weak = running is not None and limit is not None and limit < running * (1.0 - SAMPLING_SLACK)
-    slow = Origin(Basis.PRINTED, f"{drive.motor.source}, running torque; the slowest motion through the poses")
+    slow = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}, running torque; the slowest motion through the poses")
     origin = _curve_origin(drive, "torque at no speed") if weak else slow
-    demand = 0.0 if torque is None else float(torque)
-    return view.held("motor torque, quasi-static", demand, limit, "Nm", at, origin, STEPPER_MARGIN, weak)
+    return view.held(check, float(torque), limit, "Nm", at, origin, STEPPER_MARGIN, weak)
 
 
 def _other_reading_row(view: JointView, drive: Drive, torque: Array) -> Row:
@@ -110,7 +131,8 @@ def _other_reading_row(view: JointView, drive: Drive, torque: Array) -> Row:
     at = int(np.argmax(torque)) if available is None else _least_room(available, torque)
     origin = Origin(
         Basis.ESTIMATED,
-        f"if the printed efficiency holds the no-load torque already: the mesh's is {efficiency:.3f}; {drive.gearbox.source}",
+        f"if the printed efficiency holds the no-load torque already: the mesh's is {efficiency:.3f}; {drive.gearbox.source}; "
+        f"{_sheet(drive.motor)}",
     )
     limit = None if available is None else float(available[at])
     facts = (float(torque[at]), "Nm", float(view.t[at]), origin, limit)
@@ -134,7 +156,7 @@ def _motor_speed_row(view: JointView, drive: Drive, torque: Array) -> Row:
 def _inertia_row(view: JointView, drive: Drive) -> Row:
     rotor, load = drive.motor.rotor_inertia, float(view.inertia.max())
     ratio = 0.0 if rotor is None else load / drive.gearbox.ratio**2 / rotor
-    guide = f"load {load:.4g} kg m^2 over N^2, against the rotor's alone; a guide; {drive.motor.source}"
+    guide = f"load {load:.4g} kg m^2 over N^2, against the rotor's alone; a guide; {_sheet(drive.motor)}"
     limit = None if rotor is None else INERTIA_RATIO
     return view.guided("motor inertia ratio", ratio, limit, "", None, Origin(Basis.PRINTED, guide))
 
@@ -155,14 +177,14 @@ def full_step_resonance(drive: Drive) -> float | None:
 def _resonance_row(view: JointView, drive: Drive) -> Row:
     frequency, check = full_step_resonance(drive), "motor resonance dwell"
     if frequency is None:
-        why = Origin(Basis.PRINTED, f"{drive.motor.source}; holding torque or an inertia is not printed")
+        why = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; holding torque or an inertia is not printed")
         return view.guided(check, 0.0, None, "s", None, why)
     speed, resonant = drive.gearbox.ratio * np.abs(view.qd), frequency * drive.motor.step
     longest, at = longest_dwell(view.t, speed, resonant * (1.0 - RESONANCE_BAND), resonant * (1.0 + RESONANCE_BAND))
     origin = Origin(
         Basis.ESTIMATED,
         f"full-step resonance {frequency:.0f} Hz, {resonant * 30.0 / np.pi:.1f} rpm +-{RESONANCE_BAND:.0%}, for "
-        f"{RESONANCE_CYCLES:g} periods; microsteps excite it less [own derivation]; {drive.motor.source}",
+        f"{RESONANCE_CYCLES:g} periods; microsteps excite it less [own derivation]; {_sheet(drive.motor)}",
     )
     return view.guided(check, longest, RESONANCE_CYCLES / frequency, "s", at, origin)
 
@@ -190,14 +212,14 @@ def _overload_row(view: JointView, drive: Drive) -> Row:
     """Whether the motor, at its running torque, passes what its gearbox may bear: then its current wants a limit."""
     motor, gear, check = drive.motor, drive.gearbox, "motor against gearbox"
     if motor.running_torque is None or gear.efficiency is None or gear.start_stop_torque is None:
-        why = f"{motor.source}; {gear.source}; running torque, efficiency or start-stop torque is not printed"
+        why = f"{_sheet(motor)}; {gear.source}; running torque, efficiency or start-stop torque is not printed"
         return Row(view.joint, check, None, None, "Nm", None, 0.0, None, Verdict.NOT_CHECKABLE, None, why)
     at_joint = motor.running_torque * gear.ratio * gear.efficiency
     enough = gear.start_stop_torque / (gear.ratio * gear.efficiency)
     mesh = mesh_efficiency(gear)
     if mesh is not None and gear.no_load_input_torque is not None:  # a better mesh breaks it sooner
         enough = min(enough, gear.start_stop_torque / (gear.ratio * mesh) + gear.no_load_input_torque)
-    said = f"{motor.source}; {gear.source}"
+    said = f"{_sheet(motor)}; {gear.source}"
     if enough < motor.running_torque:
         amperes = "" if drive.winding is None else f" ({drive.winding.current * enough / motor.running_torque:.2g} A)"
         said = (
@@ -213,11 +235,16 @@ def _least_room(limit: Array, demand: Array) -> int:
     return int(np.argmin(np.divide(limit, demand, out=room, where=demand > 0.0)))
 
 
+def _sheet(motor: Motor) -> str:
+    """The motor's source, and by how much a motor may differ from it."""
+    return motor.source if motor.tolerance is None else f"{motor.source} (sheet values +-{motor.tolerance:.0%})"
+
+
 def _curve_origin(drive: Drive, what: str) -> Origin:
     if drive.bus_voltage is None or drive.wiring is None:
-        return Origin(Basis.PRINTED, f"{drive.motor.source}; needs bus voltage and wiring")
+        return Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; needs bus voltage and wiring")
     supply = (
         f"{drive.bus_voltage.value:g} V ({drive.bus_voltage.origin.basis}), {drive.wiring.value} ({drive.wiring.origin.basis})"
     )
     basis = Basis.weakest([Basis.ESTIMATED, *(origin.basis for origin in drive.supply_origins)])
-    return Origin(basis, f"{what}, estimated from {drive.motor.source} at {supply}")
+    return Origin(basis, f"{what}, estimated from {_sheet(drive.motor)} at {supply}")

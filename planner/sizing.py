@@ -19,7 +19,6 @@ from boom_model import (
     Origin,
     Sourced,
     Wiring,
-    inverse_dynamics,
 )
 from boom_model.arrays import scalar
 from boom_model.boom import IS_LENGTH
@@ -27,9 +26,11 @@ from boom_model.dynamics import PayloadAs
 from planner.actuator_checks import actuator_rows
 from planner.checks import drive_rows, joint_views
 from planner.joint_view import JointView
-from planner.missions import Cycle, Mission, plan_cycle
+from planner.missions import Cycle, Mission, check_steady, plan_cycle
+from planner.planning import torques
 from planner.rows import Row, Verdict, overall
 from planner.tracking import Track
+from planner.vehicle import VehicleCase, base_motion
 
 POWER_OFF = "power-off hold"
 """The brake's matter, whatever drive it holds: left out of the choice."""
@@ -155,27 +156,38 @@ def candidates(boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[
 
 def size(
     boom: Boom,
-    cycle: Cycle,
+    work: Cycle | Mission,
     joint: str,
     drives: Iterable[Drive | LinearDrive],
     *,
     adapt: Adapt = Adapt.NOTHING,
     payload_as: PayloadAs = "mass",
+    vehicle: VehicleCase | None = None,
 ) -> tuple[Judged, ...]:
     """Each drive on a joint, the others as they are: what does not fail, by mass and then by margin; what fails behind.
 
     The drives' own mass is in no body here: another one on the base changes no torque of inner and lower, one farther out
     would.
+
+    Args:
+        work: a planned cycle, which the drives are judged on; Adapt.REPLAN plans its mission anew for each, or takes a
+            mission that has not been planned.
+        vehicle: the slope that the boom stands on; the same as the cycle was planned for.
+
+    Raises:
+        InputError: no such joint, the vehicle moves, or a mission without Adapt.REPLAN.
     """
+    check_steady(vehicle)
+    load = _Load(payload_as, vehicle)
+    if adapt is Adapt.REPLAN:
+        return tuple(sorted((_replanned(boom, _mission(work), joint, drive, load) for drive in drives), key=_rank))
+    cycle = _planned(work)
+    view = _view(boom, cycle, joint, load)
     found: list[Judged] = []
-    view = _view(boom, cycle, joint, payload_as)
     for drive in drives:
-        if adapt is Adapt.REPLAN and isinstance(drive, Drive):
-            found.append(_replanned(boom, cycle.mission, joint, drive, payload_as))
-            continue
         judged = _judged(boom, cycle, joint, drive, view)
         if adapt is Adapt.RESCALE and judged.fails:
-            judged = _rescaled(boom, cycle, joint, drive, payload_as)
+            judged = _rescaled(boom, cycle, joint, drive, load)
         found.append(judged)
     return tuple(sorted(found, key=_rank))
 
@@ -203,6 +215,11 @@ class Choice:
         return next((judged for judged in self.judged if not judged.fails), None)
 
     @property
+    def unmet(self) -> bool:
+        """Whether no drive does; an extension that the catalogue has nothing for is not counted, as none was looked at."""
+        return self.lightest is None and (bool(self.judged) or not IS_LENGTH[JOINTS.index(self.joint)])
+
+    @property
     def saves(self) -> float | None:
         """How much lighter that is than what is fitted [kg]; None where one of them or its mass is not known."""
         old, new = self.fitted, self.lightest
@@ -213,18 +230,20 @@ class Choice:
 
 def choose(
     booms: Mapping[str, Boom],
-    cycle: Cycle,
+    work: Cycle | Mission,
     joints: Sequence[str],
     catalogue: Catalogue,
     voltages: Sequence[float] = (),
     adapt: Adapt = Adapt.NOTHING,
     payload_as: PayloadAs = "mass",
     track: Track = iter,
+    vehicle: VehicleCase | None = None,
 ) -> tuple[Choice, ...]:
-    """The catalogue for each joint of each boom, on the same cycle.
+    """The catalogue for each joint of each boom, on the same cycle or, with Adapt.REPLAN, on the same mission.
 
     Args:
         booms: variants by name, of the same geometry.
+        work, vehicle: as of `size`.
         track: iterates over the drives, and may show how far it is.
     """
     asked = [
@@ -235,8 +254,8 @@ def choose(
         Choice(
             name,
             joint,
-            fitted(boom, cycle, joint, payload_as),
-            size(boom, cycle, joint, islice(steps, len(drives)), adapt=adapt, payload_as=payload_as),
+            fitted(boom, _mission(work) if adapt is Adapt.REPLAN else work, joint, payload_as, vehicle),
+            size(boom, work, joint, islice(steps, len(drives)), adapt=adapt, payload_as=payload_as, vehicle=vehicle),
         )
         for name, boom, joint, drives in asked
     )
@@ -249,15 +268,38 @@ def with_drive(boom: Boom, joint: str, drive: Drive | LinearDrive) -> Boom:
     return replace(boom, drives=tuple(drive if name == joint else old for name, old in zip(JOINTS, boom.drives, strict=True)))
 
 
-def fitted(boom: Boom, cycle: Cycle, joint: str, payload_as: PayloadAs = "mass") -> Judged | None:
-    """The drive that a joint has, held against a mission; None where it has none.
+def fitted(
+    boom: Boom, work: Cycle | Mission, joint: str, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None
+) -> Judged | None:
+    """The drive that a joint has, held against a cycle, or against a mission that is planned for it; None where it has none.
 
     Raises:
-        InputError: no such joint.
+        InputError: no such joint, or the vehicle moves.
     """
-    i = _index(joint)
+    check_steady(vehicle)
+    i, load = _index(joint), _Load(payload_as, vehicle)
     drive = boom.actuator if IS_LENGTH[i] else boom.drives[i]
-    return None if drive is None else _judged(boom, cycle, joint, drive, _view(boom, cycle, joint, payload_as))
+    if drive is None:
+        return None
+    if isinstance(work, Mission):
+        return _replanned(boom, work, joint, drive, load)
+    return _judged(boom, work, joint, drive, _view(boom, work, joint, load))
+
+
+def too_high(catalogue: Catalogue, voltages: Sequence[float]) -> tuple[str, ...]:
+    """A sentence for each voltage that some motor does not allow, on which it is not tried."""
+    limits = {name: motor.max_voltage for name, motor in catalogue.motors.items() if motor.max_voltage is not None}
+    sentences = []
+    for voltage in dict.fromkeys(voltages):
+        weak = [name for name, limit in limits.items() if voltage > limit]
+        if not weak:
+            continue
+        most = max(limits[name] for name in weak)
+        if len(weak) == len(catalogue.motors):
+            sentences.append(f"{voltage:g} V is above what every motor allows ({most:g} V at most)")
+        else:
+            sentences.append(f"{voltage:g} V is above what {', '.join(weak)} allows, on which it is not tried")
+    return tuple(sentences)
 
 
 def parse_variant(boom: Boom, text: str) -> Boom:
@@ -299,11 +341,30 @@ def _wired(own: Drive | None, wiring: Wiring) -> Sourced[Wiring]:
     return own.wiring if same and own is not None and own.wiring is not None else Sourced(wiring, _GIVEN)
 
 
-def _view(boom: Boom, cycle: Cycle, joint: str, payload_as: PayloadAs) -> JointView:
-    motion = cycle.trajectory
-    states = (motion.q, motion.qd, motion.qdd)
-    tau = inverse_dynamics(boom, *states, payload_as=payload_as, friction=True, reactions=False).tau
-    return joint_views(boom, motion, tau, payload_as=payload_as, duty=cycle.duty)[_index(joint)]
+@dataclass(frozen=True)
+class _Load:
+    """What loads the joints besides the boom and its motion."""
+
+    payload_as: PayloadAs
+    vehicle: VehicleCase | None
+
+
+def _mission(work: Cycle | Mission) -> Mission:
+    return work if isinstance(work, Mission) else work.mission
+
+
+def _planned(work: Cycle | Mission) -> Cycle:
+    if isinstance(work, Mission):
+        raise InputError(f"mission {work.name} has not been planned; only Adapt.REPLAN plans it")
+    return work
+
+
+def _view(boom: Boom, cycle: Cycle, joint: str, load: _Load) -> JointView:
+    motion, vehicle = cycle.trajectory, load.vehicle
+    base = None if vehicle is None else base_motion(vehicle, motion.t)
+    bases = () if vehicle is None else (vehicle.origin.basis,)
+    tau = torques(boom, motion, load.payload_as, vehicle)
+    return joint_views(boom, motion, tau, base=base, payload_as=load.payload_as, bases=bases, duty=cycle.duty)[_index(joint)]
 
 
 def _judged(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, view: JointView) -> Judged:
@@ -316,12 +377,12 @@ def _judged(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, vi
     return Judged(joint, drive, kept, cycle.duty.duration, float(moving))
 
 
-def _rescaled(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, payload_as: PayloadAs) -> Judged:
+def _rescaled(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, load: _Load) -> Judged:
     """Slowed by the least factor with which nothing fails, to a hundredth; by the largest where something fails even so."""
 
     def slowed(factor: float) -> Judged:
         slower = cycle.stretched(factor)
-        return _judged(boom, slower, joint, drive, _view(boom, slower, joint, payload_as))
+        return _judged(boom, slower, joint, drive, _view(boom, slower, joint, load))
 
     slowest = slowed(LARGEST_STRETCH)
     if slowest.fails:
@@ -337,13 +398,13 @@ def _rescaled(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, 
     return best
 
 
-def _replanned(boom: Boom, mission: Mission, joint: str, drive: Drive, payload_as: PayloadAs) -> Judged:
+def _replanned(boom: Boom, mission: Mission, joint: str, drive: Drive | LinearDrive, load: _Load) -> Judged:
     other = with_drive(boom, joint, drive)
     try:
-        cycle = plan_cycle(other, mission)
+        cycle = plan_cycle(other, mission, load.vehicle)
     except InfeasibleError as error:
         return Judged(joint, drive, (), np.inf, np.inf, str(error))
-    return _judged(other, cycle, joint, drive, _view(other, cycle, joint, payload_as))
+    return _judged(other, cycle, joint, drive, _view(other, cycle, joint, load))
 
 
 def room(row: Row) -> float:

@@ -10,7 +10,21 @@ from boom_model.drives import STEPPER_MARGIN
 from planner.markdown import section, table
 from planner.report import cells
 from planner.rows import Row, Verdict
-from planner.sizing import Choice, Judged
+from planner.sizing import Adapt, Choice, Judged
+from planner.vehicle import VehicleCase
+
+_SHAPED = {
+    Adapt.NOTHING: "every drive is judged on the motion that the boom as it is, with its fitted drives, was planned to make; "
+    "--adapt replan plans for each",
+    Adapt.RESCALE: "every drive is judged on the motion that the boom as it is, with its fitted drives, was planned to make, "
+    "slowed where it fails; --adapt replan plans for each",
+    Adapt.REPLAN: "every drive is judged on a motion that was planned for it, the other joints' drives as they are fitted",
+}
+_LEVEL = "level ground; --vehicle gives a slope, and shocks are checked move by move"
+_STUCK = (
+    "no motion was found with any drive; the other joints keep their fitted ones, and where one of those is what cannot, "
+    "it has to be replaced first, in a boom file of your own"
+)
 
 SAVING = ("boom", "joint", "fitted", "lightest without a FAIL", "saves")
 
@@ -27,8 +41,18 @@ def ranking(choice: Choice) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
         warned = ", ".join(check for check in judged.warned if check not in choice.warned) or "-"
         facts = ("-" if judged.fails else str(place), judged.name, judged.supply, mass, *spare, warned)
         cycle = "-" if judged.infeasible else f"{judged.moving:.1f} of {judged.duration:.0f} s"
-        rows.append((*facts, *([cycle] if timed else []), outcome(judged)))
+        said = outcome(judged) if judged.infeasible is None else "FAIL: no motion"
+        rows.append((*facts, *([cycle] if timed else []), said))
     return (*header[:-1], *(["moving"] if timed else []), header[-1]), rows
+
+
+def no_motion(choice: Choice) -> tuple[str, ...]:
+    """Why there is no motion with a drive, a sentence a reason: too long for a table."""
+    drives: dict[str, list[str]] = {}
+    for judged in choice.judged:
+        if judged.infeasible is not None:
+            drives.setdefault(judged.infeasible, []).append(f"{judged.name} ({judged.supply})")
+    return tuple(f"{'; '.join(names)}: {reason}" for reason, names in drives.items())
 
 
 def outcome(judged: Judged) -> str:
@@ -77,6 +101,8 @@ def sizing_markdown(title: str, choices: Sequence[Choice], notes: Sequence[str],
     lines += ["", "## Each drive in its best supply", "", *table(*motors(choices))]
     for choice in (choice for choice in choices if choice.judged):
         lines += ["", f"## {choice.joint}, {choice.variant}", "", *table(*ranking(choice))]
+        found = [f"- no motion with {sentence}" for sentence in no_motion(choice)]
+        lines += ["", *found] if found else []
         lines += ["", f"All are warned of: {', '.join(choice.warned)}"] if choice.warned else []
     return "\n".join([*lines, *section("Notes", notes), *section("Assumed", assumed)]) + "\n"
 
@@ -112,23 +138,41 @@ def _judged_json(judged: Judged) -> dict[str, Any]:
     }
 
 
-def sizing_notes(choices: Sequence[Choice]) -> tuple[str, ...]:
-    """What a reader of the tables must know."""
+def sizing_notes(
+    choices: Sequence[Choice], adapt: Adapt = Adapt.NOTHING, vehicle: VehicleCase | None = None, left_out: Sequence[str] = ()
+) -> tuple[str, ...]:
+    """What a reader of the tables must know.
+
+    Args:
+        left_out: what was asked for and not tried, a sentence each.
+    """
     absent = dict.fromkeys(choice.joint for choice in choices if choice.fitted is None and choice.judged)
     asked = (
         [f"{', '.join(absent)}: no drive is given, and the mass of one is not added to the model's bodies"] if absent else []
     )
-    empty = dict.fromkeys(choice.joint for choice in choices if not choice.judged)
+    empty = dict.fromkeys(choice.joint for choice in choices if not choice.judged and not choice.unmet)
     asked += [f"{', '.join(empty)}: NOT CHECKED, the catalogue has nothing for it"] if empty else []
+    none_left = dict.fromkeys(choice.joint for choice in choices if not choice.judged and choice.unmet)
+    asked += [f"{', '.join(none_left)}: NOT CHECKED, nothing of the catalogue is left to try"] if none_left else []
+    asked += dict.fromkeys(_cannot(choice) for choice in choices if choice.fitted is not None and choice.fitted.infeasible)
+    stuck = dict.fromkeys(choice.joint for choice in choices if choice.judged and all(j.infeasible for j in choice.judged))
+    asked += [f"{', '.join(stuck)}: {_STUCK}"] if stuck else []
     unknown = ", ".join(unknown_checks(choices))
     notes = [
         f"a margin is (limit - demand) / demand, and a motor's torque needs {STEPPER_MARGIN:.0%}; ranked by mass, then by the "
         "least margin beyond the required one",
         "power-off is the brake's matter and left out; see the mission's own report",
+        _SHAPED[adapt],
+        _LEVEL if vehicle is None else vehicle.sentence,
         *sorted({_tolerance(judged) for choice in choices for judged in choice.judged} - {""}),
     ]
     notes += [f"no drive is known to pass, for want of data: {unknown}"] if unknown else []
-    return (*notes, *asked)
+    return (*notes, *left_out, *asked)
+
+
+def _cannot(choice: Choice) -> str:
+    why = None if choice.fitted is None else choice.fitted.infeasible
+    return f"{choice.joint}, {choice.variant}: the fitted drives cannot do the mission: {why}"
 
 
 def _tolerance(judged: Judged) -> str:
@@ -143,7 +187,7 @@ def _named(judged: Judged | None) -> str:
     if judged is None:
         return "none"
     mass = "" if judged.mass is None else f", {judged.mass:.1f} kg"
-    return f"{judged.name} ({judged.supply}){mass}"
+    return f"{judged.name} ({judged.supply}){mass}" + (", finds no motion" if judged.infeasible else "")
 
 
 def _margin(row: Row | None) -> str:

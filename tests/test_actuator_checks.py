@@ -59,6 +59,14 @@ def test_every_row_by_hand():
     assert row(rows, "actuator screw torque").verdict is Verdict.INFO
 
 
+def test_mean_force_is_the_cube_mean_over_the_travel():
+    """600 N over 0.3 m, then 300 N over 0.1 m: ((0.3 x 600^3 + 0.1 x 300^3) / 0.4)^(1/3) = 552.6 N; the plain mean is 450 N."""
+    t = np.array([0.0, 1.0, 1.0 + 1e-9, 2.0])
+    mean = row(rows_of([-600.0, -600.0, 300.0, 300.0], [0.3, 0.3, -0.1, -0.1], t=t), "actuator mean force")
+    assert mean.demand == pytest.approx(168.75e6 ** (1 / 3), rel=1e-8)
+    assert mean.demand == pytest.approx(552.6, abs=0.05)
+
+
 @pytest.mark.parametrize(
     ("figure", "check_name"),
     [

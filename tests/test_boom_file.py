@@ -470,6 +470,54 @@ def test_a_users_actuator_drives_the_extension(edited, own_catalogue):
     assert "key joints.extension.actuator.model: 'SCREW' is not in catalogue.toml (none)" in refusal(lambda: Boom.load(file))
 
 
+@pytest.mark.parametrize("step", ["0.09", "91", "inf", "nan"])
+def test_a_motors_step_is_within_bounds(tmp_path, step):
+    file = tmp_path / "mine.toml"
+    file.write_text(f'[motors.M]\nsource = "mine"\nstep_deg = {step}\n')
+    message = refusal(lambda: Catalogue.load(file))
+    assert message.startswith(f"{file}: key motors.M.step_deg: input should be ")
+    assert ("a finite number" in message) is (step in ("inf", "nan"))
+
+
+@pytest.mark.parametrize("line", ["efficiency_percent = nan", "peak_torque_Nm = inf", "mass_kg = nan", "ratio = inf"])
+def test_a_figure_that_is_not_finite_is_called_so(tmp_path, line):
+    file = tmp_path / "mine.toml"
+    ratio = "" if line.startswith("ratio") else "ratio = 100\n"
+    file.write_text(f'[gearboxes.G]\nsource = "mine"\n{ratio}{line}\n')
+    name, value = line.split(" = ")
+    assert (
+        refusal(lambda: Catalogue.load(file))
+        == f"{file}: key gearboxes.G.{name}: input should be a finite number (it is {value})"
+    )
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("torsion_T1_Nm = 108\ntorsion_T2_Nm = 29", "torsion_T1_Nm is 108; it must be below torsion_T2_Nm, which is 29"),
+        ("torsion_T1_Nm = 29\ntorsion_T2_Nm = 29", "torsion_T1_Nm is 29; it must be below torsion_T2_Nm, which is 29"),
+        (
+            "start_stop_torque_Nm = 460\npeak_torque_Nm = 75.1",
+            "peak_torque_Nm is 75.1, less than start_stop_torque_Nm, which is 460",
+        ),
+        (
+            "max_average_torque_Nm = 275\nstart_stop_torque_Nm = 46",
+            "start_stop_torque_Nm is 46, less than max_average_torque_Nm, which is 275",
+        ),
+        (
+            "max_average_torque_Nm = 275\npeak_torque_Nm = 46",
+            "peak_torque_Nm is 46, less than max_average_torque_Nm, which is 275",
+        ),
+    ],
+)
+def test_a_gearbox_whose_figures_contradict_each_other_is_refused(tmp_path, lines, said):
+    file = tmp_path / "mine.toml"
+    file.write_text(f'[gearboxes.G]\nsource = "mine"\nratio = 100\n{lines}\n')
+    message = refusal(lambda: Catalogue.load(file))
+    assert message.startswith(f"{file}: key gearboxes.G: ")
+    assert said in message
+
+
 @pytest.mark.parametrize("line", ["lead_mm = 0", "duty_percent = 101", "stroke_m = nan", "colour = 3", 'mass_kg = "4"'])
 def test_a_bad_actuator_names_file_entry_and_key(tmp_path, line):
     file = tmp_path / "mine.toml"
@@ -506,6 +554,15 @@ def test_a_body_of_another_mass_keeps_its_shape():
         pytest.param("torque_Nm = 3.0", "torque_Nm = inf", "motors.MST340B02.holding_torque_Nm", id="infinite"),
         pytest.param("kg_cm2 = 1.4", "kg_cm2 = -1.4", "motors.MST340B02.rotor_inertia_kg_cm2", id="negative"),
         pytest.param("current_A = 6.6, ", "", "motors.MST340B02.parallel.current_A", id="missing in a winding"),
+        pytest.param("current_A = 6.6", "current_A = 1e200", "motors.MST340B02.parallel.current_A", id="absurd current"),
+        pytest.param("kg_cm2 = 1.4", "kg_cm2 = 1e300", "motors.MST340B02.rotor_inertia_kg_cm2", id="absurd inertia"),
+        pytest.param("kg_m2 = 176e-6", "kg_m2 = 1e9", "gearboxes.CBG320160.input_inertia_kg_m2", id="absurd input inertia"),
+        pytest.param(
+            "K1_Nm_per_mrad = 67", "K1_Nm_per_mrad = 67000", "gearboxes.CBG320160.torsion_K1_Nm_per_mrad", id="Nm/rad"
+        ),
+        pytest.param("percent = 65", "percent = 0.65", "gearboxes.CBG320160.efficiency_percent", id="a share"),
+        pytest.param("ratio = 160", "ratio = 0.00625", "gearboxes.CBG320160.ratio", id="the other way round"),
+        pytest.param('source = "Cone', 'source = ""  # "Cone', "gearboxes.CBG320160.source", id="no source"),
     ],
 )
 def test_a_bad_catalogue_is_one_error_that_names_file_and_key(edited, old, new, key):

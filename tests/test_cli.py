@@ -374,6 +374,43 @@ def test_size_ranks_the_catalogue(boom, tmp_path):
     assert boom("size", "table-3-1", "--joint", "elbow")[0] == 2
 
 
+def test_size_says_which_voltage_no_motor_allows(boom):
+    for voltages, code in ((("200",), 1), (("80", "200"), 0)):
+        options = [part for voltage in voltages for part in ("--voltage", voltage)]
+        found, out, _ = boom("size", "table-3-1", "--joint", "inner", *options)
+        assert found == code
+        assert "Note: 200 V is above what every motor allows (165 V at most)" in out
+
+
+def test_size_stands_on_a_slope(boom):
+    rows = {}
+    for options in ((), ("--vehicle", "slope")):
+        code, out, _ = boom("size", "table-3-1", "--joint", "inner", "--json", *options)
+        answer = json.loads(out)
+        assert (code, any("slope: roll 8.5 deg" in note for note in answer["notes"])) == (0, bool(options))
+        rows[options] = {row["check"]: row["demand"] for row in answer["choices"][0]["fitted"]["checks"]}
+    level, tilted = rows.values()
+    assert tilted["gearbox hold"] != pytest.approx(level["gearbox hold"], rel=1e-3)
+    assert boom("size", "table-3-1", "--vehicle", "shock")[0] == 2
+
+
+def test_size_replans_a_mission_that_the_fitted_drive_cannot_do(boom, tmp_path):
+    from tests.test_sizing import STRONG, UNDERSIZED
+
+    (tmp_path / "quick.toml").write_text(UNDERSIZED)
+    (tmp_path / "strong.toml").write_text(STRONG)
+    asked = ("size", "quick.toml", "--joint", "lower", "--payload", "30", "--catalogue", "strong.toml")
+    for adapt in ("nothing", "rescale"):
+        code, out, err = boom(*asked, "--adapt", adapt)
+        assert (code, out, err.count("\n")) == (1, "", 1)
+        assert "the fitted drives cannot do this mission" in err
+        assert "--adapt replan" in err
+    code, out, _ = boom(*asked, "--adapt", "replan", "--report", "drives.md")
+    assert code == 0
+    assert "Note: lower, as it is: the fitted drives cannot do the mission" in out
+    assert "BIG + HUGE (parallel, 80 V), 32.0 kg" in (tmp_path / "drives.md").read_text()
+
+
 def test_a_catalogue_of_ones_own_adds_to_the_choice(boom, tmp_path):
     (tmp_path / "mine.toml").write_text('[gearboxes.MINE]\nsource = "mine"\nratio = 100\n')
     code, out, _ = boom("size", "table-3-1", "--joint", "inner", "--catalogue", "mine.toml", "--json")

@@ -192,6 +192,45 @@ def test_a_reading_that_no_mesh_allows_is_left_out(change):
     assert "motor torque, other reading" not in [r.check for r in motor_rows(view(tau=100.0, qd=0.1), bare)]
 
 
+@pytest.mark.parametrize(
+    ("part", "figure"),
+    [("gearbox", "efficiency"), ("gearbox", "no_load_input_torque"), ("gearbox", "input_inertia"), ("motor", "rotor_inertia")],
+)
+def test_without_the_motors_torque_each_row_that_needs_it_is_not_checkable(part, figure):
+    bare = replace(DRIVE, **{part: replace(getattr(DRIVE, part), **{figure: None})})
+    motion = view(tau=60.0, qd=[0.1, 0.2])
+    known, unknown = ([r.check for r in motor_rows(motion, drive)] for drive in (DRIVE, bare))
+    assert unknown == known
+    for name in (
+        "motor torque",
+        "motor torque, reversed",
+        "motor torque, quasi-static",
+        "motor torque, other reading",
+        "motor speed",
+        "motor RMS torque",
+    ):
+        found = row(motor_rows(motion, bare), name)
+        assert (found.verdict, found.limit) == (Verdict.NOT_CHECKABLE, None)
+        assert found.demand == (pytest.approx(32.0) if name == "motor speed" else None)
+        assert "efficiency, no-load torque or an inertia is not printed" in found.source
+
+
+def test_a_motors_tolerance_stands_with_each_of_its_torques():
+    plain = replace(DRIVE, motor=replace(MOTOR, tolerance=None))
+    names = [
+        "motor hold",
+        "motor torque",
+        "motor torque, reversed",
+        "motor torque, quasi-static",
+        "motor torque, other reading",
+    ]
+    for speed in (0.1, 2.0):  # by the running torque, and on the curve
+        motion = view(tau=10.0, qd=speed)
+        for name in (*names, "motor speed", "motor RMS torque", "motor against gearbox"):
+            assert "(sheet values +-10%)" in row(motor_rows(motion, DRIVE), name).source, name
+            assert "sheet values" not in row(motor_rows(motion, plain), name).source
+
+
 @pytest.mark.parametrize(("inertia", "verdict"), [(102.0, Verdict.PASS), (103.0, Verdict.WARN)])
 def test_inertia_ratio_by_hand(inertia, verdict):
     """Ten times the rotor's 4e-4 kg m^2 is 10 x 4e-4 x 160^2 = 102.4 kg m^2 at the joint."""

@@ -127,6 +127,19 @@ def test_the_field_day_sweeps_its_plots():
     assert "the mission: 40 plots" in report.assumptions[0]
 
 
+def test_a_step_takes_the_cubics_velocity_at_its_way_point(mission):
+    velocity = "4,-3,5,0.02,1"
+    steps = f'[[steps]]\nto = "phenotyping"\nvia = ["q=40,60,120,0.3,0"]\nvia_velocity = ["{velocity}"]\n'
+    cycle = plan_cycle(BOOM, mission(steps))
+    via = np.array([*np.radians([40.0, 60.0, 120.0]), 0.3, 0.0])
+    rates = np.array([*np.radians([4.0, -3.0, 5.0]), 0.02, np.radians(1.0)])
+    motion = cycle.legs[0].trajectory
+    at = int(np.abs(motion.q - via).max(axis=1).argmin())
+    np.testing.assert_allclose(motion.qd[at], rates, rtol=0, atol=3e-4)
+    move = plan(BOOM, "transport", "phenotyping", via=[via], via_velocities=[rates])
+    assert check_cycle(BOOM, cycle).rows == move.report.rows
+
+
 @pytest.mark.parametrize(("name", "duration"), [("table-2-4", 10.0), ("table-3-1", 5.0)])
 def test_the_thesis_moves_are_missions(name, duration):
     cycle = plan_cycle(BOOM, load_mission(name))
@@ -209,6 +222,8 @@ def test_a_bad_mission_names_file_and_key(mission, steps, said):
             "mission mine, steps 2: duration",
         ),
         ('[[steps]]\nto = "phenotyping"\nprofile = "fast"\n', InputError, "steps 1: profile is 'fast'"),
+        ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2"]\n', InputError, "steps 1: "),
+        ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2,3,0,0"]\n', InputError, "with 0 waypoints without a stop"),
         ('[[steps]]\nrepeat = 1\n[[steps.steps]]\nto = "tip=9,0,0"\n', InfeasibleError, "steps 1, steps 1: tip"),
         ('[[steps]]\nto = "tip=1.4,0,1.0"\nalong = "line"\n', InfeasibleError, "steps 1: "),
         ("[[steps]]\nrepeat = 100001\n[[steps.steps]]\nhold_s = 1\n", InputError, "more than 100,000 steps"),
@@ -256,3 +271,15 @@ def test_means_of_random_weights_are_those_of_repeated_samples():
     assert duty.travel_mean(load, rate) == pytest.approx(cube, rel=1e-12)
     alone = Trajectory.from_samples([0.0], np.zeros((1, 5)), np.zeros((1, 5)), np.zeros((1, 5)))
     assert Duty.alone(alone.t).mean(np.array([7.0])) == 7.0
+
+
+@pytest.mark.parametrize(
+    ("steps", "limited"),
+    [
+        (THERE_AND_BACK, True),
+        ('[[steps]]\nto = "phenotyping"\n', False),
+        ('[[steps]]\nrepeat = 2\n[[steps.steps]]\nto = "phenotyping"\nprofile = "time-optimal"\njerk_bound = true\n', True),
+    ],
+)
+def test_a_mission_knows_whether_it_is_held_to_the_jerk_limits(mission, steps, limited):
+    assert mission(steps).jerk_limited is limited

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from boom_model import Boom, Catalogue, Drive, InputError, LinearDrive, Wiring
+from boom_model import Boom, Catalogue, Drive, InfeasibleError, InputError, LinearDrive, Wiring
 from planner import Verdict
 from planner.missions import check_cycle, load_mission, plan_cycle
 from planner.sizing import (
@@ -20,9 +20,11 @@ from planner.sizing import (
     parse_variant,
     room,
     size,
+    too_high,
     with_drive,
 )
 from planner.sizing_tables import motors, outcome, ranking, saving, sizing_json, sizing_markdown, sizing_notes
+from planner.vehicle import load_case
 from tests.test_actuator_checks import SCREW
 
 BOOM = Boom.load()
@@ -159,6 +161,147 @@ def test_replanning_suits_the_moves_to_the_drive():
     assert heavy.infeasible is not None
     assert heavy.fails
     assert outcome(heavy).startswith("FAIL: mission field day, steps 2")
+
+
+UNDERSIZED = """
+name = "quick"
+basis = "assumed"
+source = "this test"
+start = "transport"
+
+[[steps]]
+to = "phenotyping"
+profile = "time-optimal"
+"""
+STRONG = """
+[motors.BIG]
+source = "this test"
+step_deg = 1.8
+holding_torque_Nm = 40
+running_torque_Nm = 32
+mass_kg = 12
+rotor_inertia_kg_cm2 = 12
+parallel = { current_A = 20, resistance_ohm = 0.1, inductance_mH = 0.5 }
+
+[gearboxes.HUGE]
+source = "this test"
+ratio = 160
+continuous_torque_Nm = 1500
+max_average_torque_Nm = 1700
+start_stop_torque_Nm = 2000
+peak_torque_Nm = 4000
+efficiency_percent = 65
+no_load_input_torque_Nm = 0.5
+mass_kg = 20
+input_inertia_kg_m2 = 200e-6
+"""
+
+
+@pytest.fixture
+def undersized(tmp_path):
+    """A mission that the fitted drive of lower cannot do with 30 kg, and a catalogue with one that can."""
+    mission, catalogue = tmp_path / "quick.toml", tmp_path / "strong.toml"
+    mission.write_text(UNDERSIZED)
+    catalogue.write_text(STRONG)
+    return load_mission(str(mission)), CATALOGUE.with_file(catalogue)
+
+
+def test_replanning_sizes_for_a_mission_that_the_fitted_drive_cannot_do(undersized):
+    mission, catalogue = undersized
+    boom = BOOM.with_payload(30.0)
+    with pytest.raises(InfeasibleError, match="joint lower needs 545"):
+        plan_cycle(boom, mission)
+    (choice,) = choose({"as it is": boom}, mission, ("lower",), catalogue, adapt=Adapt.REPLAN)
+    assert choice.fitted.infeasible is not None
+    assert (choice.fitted.verdict, choice.fitted.rows) == (Verdict.FAIL, ())
+    assert choice.lightest.name == "BIG + HUGE"
+    assert not choice.unmet
+    assert [j.name for j in choice.judged if not j.fails] == ["BIG + HUGE"]
+    assert choice.lightest.rows == fitted(
+        with_drive(boom, "lower", choice.lightest.drive),
+        plan_cycle(with_drive(boom, "lower", choice.lightest.drive), mission),
+        "lower",
+    ).rows  # fmt: skip
+    notes = sizing_notes((choice,), Adapt.REPLAN)
+    assert any(note.startswith("lower, as it is: the fitted drives cannot do the mission: mission quick") for note in notes)
+    text = sizing_markdown("Drives", (choice,), notes)
+    assert "- no motion with MST340B02 + CBG320160 (parallel, 80 V)" in text
+    assert "7.1 kg, finds no motion" in text
+    assert {"FAIL: no motion"} == {line[-1] for line in ranking(choice)[1][1:]}
+    assert sizing_json("quick", (choice,), notes)["choices"][0]["fitted"]["infeasible"] == choice.fitted.infeasible
+
+
+def test_another_joint_that_cannot_is_named_as_what_stands_in_the_way(undersized):
+    mission, catalogue = undersized
+    (choice,) = choose({"as it is": BOOM.with_payload(30.0)}, mission, ("inner",), catalogue, adapt=Adapt.REPLAN)
+    assert choice.unmet
+    assert all("joint lower needs" in judged.infeasible for judged in choice.judged if judged.name == "BIG + HUGE")
+    assert all(judged.infeasible for judged in choice.judged)
+    assert any(note.startswith("inner: no motion was found with any drive") for note in sizing_notes((choice,), Adapt.REPLAN))
+
+
+def test_replanning_plans_on_the_slope_and_with_the_variant(undersized):
+    """Uphill with 22 kg a time-optimal move takes longer; and another payload's motion says nothing of the fitted drive."""
+    mission, slope, boom = undersized[0], load_case("slope"), BOOM.with_payload(22.0)
+    drive = boom.drives[2]
+    (level,), (tilted,) = (
+        size(boom, mission, "lower", [drive], adapt=Adapt.REPLAN, vehicle=vehicle) for vehicle in (None, slope)
+    )
+    assert tilted.moving == pytest.approx(plan_cycle(boom, mission, slope).duty.duration, rel=1e-12)
+    assert tilted.moving > 1.0005 * level.moving
+    light = replace(CATALOGUE, motors={"MST340B02": CATALOGUE.motors["MST340B02"]})
+    cycle, heavy = plan_cycle(BOOM, mission), {"payload=30": BOOM.with_payload(30.0)}
+    (choice,) = choose(heavy, cycle, ("lower",), light, adapt=Adapt.REPLAN)
+    assert choice.fitted.infeasible is not None
+
+
+@pytest.mark.parametrize("adapt", [Adapt.NOTHING, Adapt.RESCALE])
+def test_a_mission_without_a_motion_is_for_replanning_alone(undersized, adapt):
+    with pytest.raises(InputError, match="mission quick has not been planned"):
+        choose({"as it is": BOOM}, undersized[0], ("lower",), CATALOGUE, adapt=adapt)
+
+
+def test_notes_say_whose_motion_the_drives_are_judged_on_and_on_what_ground():
+    said = {adapt: sizing_notes((), adapt) for adapt in Adapt}
+    for adapt in (Adapt.NOTHING, Adapt.RESCALE):
+        assert any("the motion that the boom as it is, with its fitted drives, was planned to make" in n for n in said[adapt])
+    assert any("a motion that was planned for it" in note for note in said[Adapt.REPLAN])
+    assert any(note.startswith("level ground") for note in said[Adapt.NOTHING])
+    on_slope = sizing_notes((), vehicle=load_case("slope"))
+    assert any("slope: roll 8.5 deg" in note for note in on_slope)
+    assert not any(note.startswith("level ground") for note in on_slope)
+
+
+@pytest.mark.parametrize("adapt", [Adapt.NOTHING, Adapt.REPLAN])
+def test_on_a_slope_the_rows_are_those_of_the_mission_on_the_slope(adapt):
+    slope = load_case("slope")
+    cycle = plan_cycle(BOOM, load_mission("table-3-1"), slope)
+    drives = candidates(BOOM, "inner", CATALOGUE)[:2]
+    level = {j.supply: j.rows for j in size(BOOM, cycle, "inner", drives)}
+    for judged in size(BOOM, cycle, "inner", drives, adapt=adapt, vehicle=slope):
+        report = check_cycle(with_drive(BOOM, "inner", judged.drive), cycle, vehicle=slope)
+        expected = tuple(
+            r for r in report.rows if r.joint == "inner" and r.check.startswith(("gearbox", "motor")) and r.check != POWER_OFF
+        )
+        assert judged.rows == expected
+        assert judged.rows != level[judged.supply]
+    with pytest.raises(InputError, match="vehicle case shock: a mission takes a slope alone"):
+        size(BOOM, cycle, "inner", drives, vehicle=load_case("shock"))
+
+
+def test_a_voltage_that_motors_do_not_allow_is_said():
+    assert too_high(CATALOGUE, (80.0, 165.0)) == ()
+    assert too_high(CATALOGUE, (80.0, 200.0, 200.0)) == ("200 V is above what every motor allows (165 V at most)",)
+    weak = replace(CATALOGUE.motors["MST340B02"], name="WEAK", max_voltage=60.0)
+    mixed = replace(CATALOGUE, motors={**CATALOGUE.motors, "WEAK": weak})
+    assert too_high(mixed, (80.0,)) == ("80 V is above what WEAK allows, on which it is not tried",)
+    open_ended = replace(CATALOGUE, motors={"ANY": replace(weak, max_voltage=None)})
+    assert too_high(open_ended, (1000.0,)) == ()
+    (none,) = choose({"x": BOOM}, MAIN, ("inner",), CATALOGUE, (200.0,))
+    assert none.unmet
+    assert any("inner: NOT CHECKED, nothing of the catalogue is left" in note for note in sizing_notes((none,)))
+    (extension,) = choose({"x": BOOM}, MAIN, ("extension",), CATALOGUE, (200.0,))
+    assert not extension.unmet
 
 
 def replace_profile(step):

@@ -4,7 +4,7 @@ from typing import Any
 
 import click
 
-from boom_model import InputError
+from boom_model import InfeasibleError, InputError
 from planner.cli.options import (
     boom_option,
     check_picture,
@@ -115,6 +115,7 @@ def mission(
 )  # fmt: skip
 @payload_option
 @payload_as_option
+@vehicle_option
 @report_option
 @boom_option
 @json_option
@@ -126,6 +127,7 @@ def size(
     variants: tuple[str, ...],
     payload: float | None,
     payload_as: Any,
+    vehicle: str | None,
     document: str | None,
     boom_file: str | None,
     as_json: bool,
@@ -139,32 +141,43 @@ def size(
     from boom_model import JOINTS, Catalogue
     from planner.document import write_document
     from planner.files import check_writable
-    from planner.missions import load_mission, plan_cycle
+    from planner.missions import check_steady, load_mission, plan_cycle
     from planner.report import assumptions
-    from planner.sizing import Adapt, choose, parse_variant
+    from planner.sizing import Adapt, choose, parse_variant, too_high
     from planner.sizing_pictures import sizing_pictures
-    from planner.sizing_tables import SAVING, motors, ranking, saving, sizing_json, sizing_markdown, sizing_notes
+    from planner.sizing_tables import SAVING, motors, no_motion, ranking, saving, sizing_json, sizing_markdown, sizing_notes
+    from planner.vehicle import load_case
 
-    boom = load_boom(boom_file, payload)
+    boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
     check_report(document)
     check_writable(document)
     catalogue = Catalogue.load().with_file(given_catalogue())
     booms = {"as it is": boom} | {text: parse_variant(boom, text) for text in variants}
-    cycle = plan_cycle(boom, load_mission(mission), track=tracked("planning the mission"))
+    how, asked = Adapt(adapt), load_mission(mission)
+    check_steady(case)
+    try:
+        work = asked if how is Adapt.REPLAN else plan_cycle(boom, asked, case, track=tracked("planning the mission"))
+    except InfeasibleError as error:
+        raise InfeasibleError(
+            "the fitted drives cannot do this mission, on whose motion every drive would be judged; --adapt replan plans for "
+            f"each: {error}"
+        ) from None
     choices = choose(
-        booms, cycle, joints or JOINTS, catalogue, voltages, Adapt(adapt), payload_as, tracked("going through the catalogue")
+        booms, work, joints or JOINTS, catalogue, voltages, how, payload_as, tracked("going through the catalogue"), case
     )
-    notes, written = sizing_notes(choices), {} if document is None else {"report": document}
+    notes = sizing_notes(choices, how, case, too_high(catalogue, voltages))
+    written = {} if document is None else {"report": document}
     if document is not None:
-        assumed = (*cycle.mission.assumptions, *assumptions(boom, cycle.trajectory.qddd is not None))
-        text = sizing_markdown(f"Drives for the mission {cycle.mission.name}", choices, notes, assumed)
+        assumed = (*asked.assumptions, *assumptions(boom, asked.jerk_limited))
+        text = sizing_markdown(f"Drives for the mission {asked.name}", choices, notes, assumed)
         write_document(document, text, sizing_pictures(choices))
     if as_json:
-        print_json(sizing_json(cycle.mission.name, choices, notes) | {"files": written})
+        print_json(sizing_json(asked.name, choices, notes) | {"files": written})
     else:
         for choice in (choice for choice in choices if choice.judged):
             click.echo(f"{choice.joint}, {choice.variant}")
             print_rows(*ranking(choice))
+            print_lines("No motion with", no_motion(choice))
             print_lines("All are warned of", choice.warned)
         click.echo("Each drive in its best supply")
         print_rows(*motors(choices))
@@ -172,4 +185,4 @@ def size(
         print_rows(SAVING, saving(choices))
         print_lines("Note", notes)
         print_files(written)
-    return ANSWER_IS_NO if any(choice.judged and choice.lightest is None for choice in choices) else 0
+    return ANSWER_IS_NO if any(choice.unmet for choice in choices) else 0
