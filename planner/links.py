@@ -101,7 +101,8 @@ class LinkTask:
             "the thesis's method knows no shear; the exact method does": by_thesis and self.shear is not None,
             "the thesis's method does not hold buckling: there is none to leave out": by_thesis and not self.buckling,
             "the thesis's method always takes the largest components": by_thesis and self.largest_components,
-            "the thesis's load is one case: it has no largest components": self.load == LoadFrom.THESIS and self.largest_components,
+            "the thesis's load is one case: it has no largest components": self.load == LoadFrom.THESIS
+            and self.largest_components,
         }
         for reason, asked in pointless.items():
             if asked:

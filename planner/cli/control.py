@@ -1,6 +1,7 @@
 """A planned move followed in closed loop."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -47,7 +48,11 @@ if TYPE_CHECKING:
 @hold_option
 @payload_option
 @click.option("--payload-error", default=0.0, metavar="KG", help="True payload less the one that the controllers believe in.")
-@click.option("--gust", metavar="FX,FY,FZ,START,DURATION", help="A push on the tip, (1 - cos)/2, in N along frame 1 and s.")
+@click.option(
+    "--gust",
+    metavar="FX,FY,FZ,START,DURATION",
+    help="A push on the tip, (1 - cos)/2, in N along frame 1 and s, within the time simulated: the move and 2 s.",
+)
 @click.option("--rigid-joints", is_flag=True, help="Leave out the gearboxes' elasticity, friction and the links' bending.")
 @click.option("--rigid-links", is_flag=True, help="Leave out the bending of inner link and extension.")
 @click.option("--backlash", is_flag=True, help="With the gearboxes' backlash.")
@@ -106,6 +111,7 @@ def control(
     from planner.control.closed_loop import parse_gust
     from planner.control.design import Controller, Goals
     from planner.control.figures import parse_figures
+    from planner.control.plant import Plant
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
     from planner.files import check_writable
@@ -129,6 +135,9 @@ def control(
         settled=settle_mm * 1e-3,
     )
     chosen = [_several("controller", controllers, list(Controller)), _several("shaper", shapers, list(Shaper))]
+    left_out = controllers == "all" and not Plant.of(boom, setup.figures, elastic=setup.elastic, bending=False).elastic
+    if left_out:
+        chosen[0].remove(Controller.STEPPER)
     for name in (loops, errors):
         if name is not None and not name.endswith(".png"):
             raise InputError(f"{name}: a picture is written as .png")
@@ -143,6 +152,8 @@ def control(
     ]
     names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
     found = study(boom, moves, *names, setup, tracked("simulating"))
+    if left_out:
+        found = replace(found, notes=(*found.notes, "stepper: left out, as it is simulated behind elastic gearboxes alone"))
     written = {}
     if out is not None:
         from planner.recording import write_control_recording
