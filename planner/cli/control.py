@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -20,7 +20,7 @@ from planner.cli.options import (
     vehicle_option,
 )
 from planner.cli.printing import ANSWER_IS_NO, STYLES, new_console, new_table, print_files, print_json, print_lines, tracked
-from planner.targets import parse_hold, parse_pitch, parse_target
+from planner.targets import parse_along, parse_hold, parse_pitch, parse_target
 
 if TYPE_CHECKING:
     from planner.control.study import Study
@@ -40,6 +40,10 @@ if TYPE_CHECKING:
     "--shaper", "shapers", default="none", show_default=True, metavar="NAME,...|all",
     help="none, zv, zvd: impulses that cancel the lowest mode, for half a period or a whole one.",
 )  # fmt: skip
+@click.option("--via", multiple=True, metavar="TARGET", help="As in `boom plan`; may be given again.")
+@click.option("--pass-via", is_flag=True, help="As in `boom plan`.")
+@click.option("--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z", help="As in `boom plan`.")
+@click.option("--jerk-bound", is_flag=True, help="As in `boom plan`.")
 @click.option("--bandwidth", default=6.0, show_default=True, metavar="HZ", help="Natural frequency of the loops' poles.")
 @click.option("--damping", default=1.0, show_default=True, help="Damping ratio of the loops' poles.")
 @click.option("--integral", default=0.3, show_default=True, help="Integral action's pole, as a share of the bandwidth.")
@@ -75,6 +79,10 @@ def control(
     profiles: str,
     controllers: str,
     shapers: str,
+    via: tuple[str, ...],
+    pass_via: bool,
+    along: str,
+    jerk_bound: bool,
     bandwidth: float,
     damping: float,
     integral: float,
@@ -145,9 +153,19 @@ def control(
         raise InputError("a stepper runs open loop: there is no Bode diagram of it")
     check_report(document)
     check_writable(out, loops, errors, document)
-    ends, held, angle = (parse_target(start), parse_target(goal)), parse_hold(hold), parse_pitch(pitch)
+    ends = parse_target(start), parse_target(goal)
+    path: dict[str, Any] = {
+        "duration": duration,
+        "pitch": parse_pitch(pitch),
+        "hold": parse_hold(hold),
+        "via": [parse_target(text) for text in via],
+        "stop_at_via": not pass_via,
+        "along": parse_along(along),
+        "jerk_bound": jerk_bound,
+        "vehicle": case,
+    }
     moves = [
-        plan_move(boom, *ends, profile=profile, duration=duration, pitch=angle, hold=held, vehicle=case)
+        plan_move(boom, *ends, profile=profile, **path)
         for profile in _several("profile", profiles, list(Profile))
     ]
     names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
