@@ -7,7 +7,7 @@ import numpy as np
 
 from boom_model import JOINTS
 from planner.link_convergence import PLACES, Convergence
-from planner.links import LinkDesign
+from planner.links import INSIDE, LinkDesign
 from planner.markdown import section, table
 from planner.report import assumptions
 
@@ -15,7 +15,7 @@ from planner.report import assumptions
 def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:
     """The JSON object of `boom link`, in SI."""
     exact = design.exact
-    least, most = design.saved
+    least, most = (None, None) if design.link.fittings is None else design.saved
     before, after = (float(np.abs(t).max()) for t in design.torques)
     return {
         "link": design.link.name,
@@ -47,9 +47,23 @@ def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:
         "load_cases": design.cases.count,
         "governing": [] if exact is None or design.instants is None else design.instants[list(exact.governing)].tolist(),
         "checks": [
-            {"model": c.model, "elements": c.elements, "tip_deflection_m": c.deflection, "max_stress_Pa": c.stress}
+            {
+                "model": c.model,
+                "elements": c.elements,
+                "tip_deflection_m": c.deflection,
+                "max_stress_Pa": c.stress,
+                "stress_between": list(INSIDE),
+            }
             for c in design.checks
         ],
+        "stress_check": None
+        if design.stress_check is None
+        else {
+            "x_m": design.stress_check.x,
+            "elements": design.stress_check.elements,
+            "by_elements_Pa": design.stress_check.by_elements,
+            "own_Pa": design.stress_check.own,
+        },
         "body": {
             "mass_kg": design.body.mass,
             "com_m": design.body.com.tolist(),
@@ -135,10 +149,25 @@ def rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
     if design.equal_constraints is not None:
         theirs, ours = design.equal_constraints
         found.append(("plates at the thesis's constraints", "-", f"{theirs:.4f} kg thesis, {ours:.4f} kg exact", "-"))
+    within = "stress at {:.0f} to {:.0f} % of the length".format(*(100.0 * share for share in INSIDE))
     found += [
-        (f"check: {c.model}, {c.elements} elements", "-", f"{1e3 * c.deflection:.3f} mm, {1e-6 * c.stress:.1f} MPa", "-")
+        (
+            f"check: {c.model}, {c.elements} elements; {within}",
+            "-",
+            f"{1e3 * c.deflection:.3f} mm, {1e-6 * c.stress:.1f} MPa",
+            "-",
+        )
         for c in design.checks
     ]
+    if (s := design.stress_check) is not None:
+        found.append(
+            (
+                f"check: Euler-Bernoulli beam, {s.elements} elements; where the stress is largest, x = {s.x:.4g} m",
+                "-",
+                f"{1e-6 * s.by_elements:.1f} MPa, by the design {1e-6 * s.own:.1f} MPa",
+                f"{1e-6 * limits.stress:.4g} MPa",
+            )
+        )
     return found
 
 
@@ -146,13 +175,22 @@ def sentences(design: LinkDesign) -> list[str]:
     """What the new link changes in the boom."""
     old, new = design.before.bodies[design.link.name].mass, design.body.mass
     before, after = (float(np.abs(t).max()) for t in design.torques)
-    least, most = design.saved
+    known = design.link.fittings
     return [
         f"{design.link.name} link: {old:.3f} kg before, {new:.3f} kg now, fittings "
-        f"{'of ' + format(design.link.fittings.mass, '.3f') + ' kg included' if design.link.fittings else 'not included'}",
-        f"{JOINTS[design.joint]} torque, largest: {before:.1f} Nm before, {after:.1f} Nm now; "
-        f"{100 * least:.2f} to {100 * most:.2f} % less along the moves",
+        f"{'not included' if known is None else f'of {known.mass:.3f} kg included'}",
+        f"{JOINTS[design.joint]} torque, largest: {before:.1f} Nm before, {after:.1f} Nm now; {_saving(*design.saved)}"
+        if known is not None
+        else f"{JOINTS[design.joint]} torque, largest: {before:.1f} Nm before; without the fittings' mass no saving is known",
     ]
+
+
+def _saving(least: float, most: float) -> str:
+    if most < 0.0:
+        return f"{-100 * most:.2f} to {-100 * least:.2f} % more along the moves"
+    if least < 0.0:
+        return f"from {-100 * least:.2f} % more to {100 * most:.2f} % less along the moves"
+    return f"{100 * least:.2f} to {100 * most:.2f} % less along the moves"
 
 
 MOTORS_HEADER = ("motor", "mass", "before", "margin", "now", "margin")

@@ -151,6 +151,25 @@ def test_the_command_reports_and_leaves_its_files(boom, tmp_path):  # noqa: F811
     assert (tmp_path / "l.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_all_controllers_of_a_rigid_boom_are_those_that_it_can_have(boom):  # noqa: F811
+    code, out, err = boom(*QUICK, "--rigid-joints")
+    assert (code, err) == (0, "")
+    assert "4 of 4 cases: follows" in out
+    assert "Note: stepper: left out" in out
+
+
+def test_a_boom_that_topples_on_its_springs_is_no_answer(boom):  # noqa: F811
+    code, out, err = boom(*QUICK, "--controller", "pid", "--set", "inner_height_mm=0.5")
+    assert (code, out) == (1, "")
+    assert "the boom's weight topples it on its elastic joints" in err
+    assert err.count("\n") == 1
+
+
+def test_a_gust_that_was_given_is_not_called_assumed(boom):  # noqa: F811
+    _, out, _ = boom(*QUICK, "--controller", "pid", "--gust", "0,0,-30,0.1,0.2")
+    assert "gust on the tip: (0.0, 0.0, -30.0) N at most, from 0.1 s for 0.2 s (given)" in out
+
+
 def test_the_command_fails_where_the_boom_does(boom, tmp_path):  # noqa: F811
     code, out, _ = boom(*QUICK, "--controller", "stepper", "--payload-error", "60", "--json")
     answer = json.loads(out)
@@ -176,6 +195,8 @@ def test_the_command_fails_where_the_boom_does(boom, tmp_path):  # noqa: F811
         (("--errors", "x.jpg"), "a picture is written as .png"),
         (("--payload-error", "nan"), "payload is nan"),
         (("--rigid-joints", "--controller", "stepper"), "no joint is elastic"),
+        (("--controller", "pid", "--gust", "0,0,-30,50,1"), "gust from 50 s to 51 s; it must lie within the simulated 0 to "),
+        (("--controller", "pid", "--gust", "0,0,-30,-1,0.5"), "gust from -1 s to -0.5 s; it must lie within"),
     ],
 )
 def test_bad_input_is_named(boom, tmp_path, options, message):  # noqa: F811

@@ -30,7 +30,7 @@ def test_end_load_and_own_body_force_of_a_prism():
     forces = internal_forces(b, uniform(b), cases((-700.0, -300.0), 20.0, ((ax, bx), (ay, by))))
     x, q = b.stations, RHO * AREA
     far, s = LENGTH - x, LENGTH**2 - x**2
-    np.testing.assert_allclose(forces.N[0], -700.0 - q * (ax * far + bx * s / 2.0), rtol=1e-6)
+    np.testing.assert_allclose(forces.N[0], -700.0 - q * (ax * far + bx * s / 2.0), rtol=2e-14)
     np.testing.assert_allclose(forces.V[0], -300.0 - q * (ay * far + by * s / 2.0), rtol=1e-5)
     bending = ay * far**2 / 2.0 + by * ((LENGTH**3 - x**3) / 3.0 - x * s / 2.0)
     np.testing.assert_allclose(forces.M[0], 20.0 - 300.0 * far - q * bending, atol=2e-4)

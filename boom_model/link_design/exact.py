@@ -40,6 +40,9 @@ from boom_model.link_design.interior_point import Capacity, Optimum, Problem, so
 _AGREED = 1e-9
 """Relative change of the mass at which heights and forces agree."""
 
+_NEARLY_AGREED = 1e-5
+"""What is enough after half of the repeats: where the prices of an own mass are steep, rounding is all that is left."""
+
 _MOST_REPEATS = 60
 
 
@@ -193,18 +196,16 @@ def _least_mass(beam: Beam, cases: LoadCases, limits: Limits, own_mass: bool, sh
             break
         forces = internal_forces(beam, H, cases)
         price = search.price(H, forces, found)
-        if repeat > 1 and change <= max(_AGREED, (found.value - found.lower_bound) / found.value):
+        agreed = _AGREED if repeat < _MOST_REPEATS // 2 else _NEARLY_AGREED
+        if repeat > 1 and change <= max(agreed, (found.value - found.lower_bound) / found.value):
             break
     else:
-        raise InfeasibleError(
-            f"after {_MOST_REPEATS} repeats the link's mass and its own load do not agree: it does not carry itself"
-        )
+        raise InfeasibleError(f"after {_MOST_REPEATS} repeats the link's mass and its own load still change each other")
     if found is None:
         raise RuntimeError("the search ran at least once")
-    bound: float | None = found.lower_bound
-    if own_mass:
-        bound = _lower_bound(search, H, forces, found)
-        bound = bound if bound is not None and bound >= 0.9 * mass(beam, H) else None
+    bound = _lower_bound(search, H, forces, found) if own_mass else found.lower_bound
+    if bound is not None and not bound >= 0.9 * mass(beam, H):
+        bound = None
     stressed = von_mises(beam, H, forces)
     return Design(
         beam=beam,

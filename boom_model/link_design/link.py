@@ -51,6 +51,22 @@ class Link:
     cross_plates: int = 0
     """Plates between the plates, evenly along the designed part, as thick as one and as high as the contour there"""
 
+    def __post_init__(self) -> None:
+        (first, last), thickness = self.designed, self.width / self.plates
+        together = (self.plates - 1) * thickness
+        if not first < last:
+            raise InputError(f"{self.name} link: designed_to is {last:g}; it must be above designed_from, {first:g}")
+        if self.spacing < together * (1.0 - 1e-9):
+            raise InputError(
+                f"{self.name} link: spacing is {self.spacing:g} m; {self.plates} plates of {thickness:g} m need at least "
+                f"{together:g} m between the outermost ones' middles"
+            )
+        if self.cross_plates * thickness > (last - first) * self.length:
+            raise InputError(
+                f"{self.name} link: {self.cross_plates} cross plates of {thickness:g} m do not fit into the "
+                f"{(last - first) * self.length:g} m of its designed part"
+            )
+
     def beam(self, material: Material, slices: int) -> Beam:
         return Beam(self.length, self.width, material, slices=slices, plates=self.plates, support=self.support)
 
@@ -59,7 +75,7 @@ def load_link(boom: Boom, name: str, path: str | Path | None = None) -> Link:
     """A link of a boom with the plates and fittings of a TOML file; None is the shipped `boom_model/data/links.toml`.
 
     Raises:
-        InputError: there is no such link, or the file cannot be read or breaks the form; names the key.
+        InputError: there is no such link, the file cannot be read or breaks the form, or its plates do not fit; names the key.
     """
     file = LINKS_FILE if path is None else Path(path)
     table = read_toml(file, _LinksTable).links
@@ -100,7 +116,7 @@ def link_body(link: Link, beam: Beam, H: Array) -> Body:
     zz = float((off**2).mean()) + thickness**2 / 12.0
     parts = [_moments(m, x, dx**2 / 12.0, h**2 / 12.0, zz)]
     if link.cross_plates:
-        gap = max(link.spacing - thickness, 0.0)
+        gap = link.spacing - thickness
         at = (
             np.array(link.designed[0]) + (np.arange(link.cross_plates) + 0.5) / link.cross_plates * np.ptp(link.designed)
         ) * beam.length

@@ -86,8 +86,8 @@ def thesis_design(
         step: delta-H [m].
 
     Raises:
-        InputError: a limit or the step is not above 0, or the beam is no cantilever.
-        InfeasibleError: a station would be more than MOST_STEPS steps high.
+        InputError: a limit or the step is not above 0, the step is too small for a beam's heights, or the beam is no cantilever.
+        InfeasibleError: a station would be more than MOST_STEPS steps high, and that more than a fifth of the length.
     """
     if beam.support != "cantilever":
         raise InputError("the thesis's method is for a cantilever; a strut between two pins needs the exact method")
@@ -101,7 +101,7 @@ def thesis_design(
     arms[:-1] += arm[:-1]
     arms[1:] += arm[:-1]
     c = 12.0 * moments * beam.step / 2.0 * arms / (beam.material.elastic_modulus * beam.width)
-    added = _deflection_stage(stress_steps, c, deflection_limit, step)
+    added = _deflection_stage(stress_steps, c, deflection_limit, step, beam.length)
     after = step * (stress_steps + added)
     slice_mass = beam.material.density * beam.width * beam.step
     return ThesisDesign(
@@ -134,7 +134,7 @@ def _stress_stage(beam: Beam, load: ThesisLoad, limit: float, step: float) -> tu
 
     k = 1
     while (found := stress(k * step, fx, fy, 0.0)) >= limit:
-        k = _raised(k, step)
+        k = _raised(k, step, L)
     steps[n], stresses[n] = k, found
     mass = first = second = across_x = across_y = across_z = 0.0  # of the slices so far, about B
     for i in range(1, n + 1):
@@ -155,20 +155,29 @@ def _stress_stage(beam: Beam, load: ThesisLoad, limit: float, step: float) -> tu
             found = stress(H, N, V, M)
             if found < limit:
                 break
-            k = _raised(k, step)
+            k = _raised(k, step, L)
         mass, first, second = total, moment, second + m * middle**2
         across_x, across_y, across_z = Ix, Iy - apart, Iz - apart
         steps[n - i], stresses[n - i], moments[n - i] = k, found, abs(M)
     return steps, stresses, moments
 
 
-def _raised(k: int, step: float) -> int:
+def _raised(k: int, step: float, length: float) -> int:
     if k >= MOST_STEPS:
-        raise InfeasibleError(f"a slice needs more than {MOST_STEPS * step:g} m of height to hold the stress: no such link")
+        raise _too_high(step, length, "to hold the stress, a slice")
     return k + 1
 
 
-def _deflection_stage(start: Array, c: Array, limit: float, step: float) -> Array:
+def _too_high(step: float, length: float, what: str) -> InputError | InfeasibleError:
+    """What stops a search at MOST_STEPS: the step, unless heights beyond a beam's are asked for."""
+    most = MOST_STEPS * step
+    if most < 0.2 * length * (1.0 - 1e-9):
+        least = 0.2 * length / MOST_STEPS
+        return InputError(f"step is {step:g} m; {what} needs more than {MOST_STEPS} of it: {least:.2g} m is small enough")
+    return InfeasibleError(f"{what} needs more than {most:g} m of height: no such link")
+
+
+def _deflection_stage(start: Array, c: Array, limit: float, step: float, length: float) -> Array:
     """Steps added at each station (n + 1,) until sum c / H^3 is at most the limit, each the one that takes most off."""
     deflection = float((c / (step * start) ** 3).sum())
     if deflection <= limit:
@@ -185,6 +194,4 @@ def _deflection_stage(start: Array, c: Array, limit: float, step: float) -> Arra
             return np.bincount(order[: last + 1] // levels, minlength=start.size).astype(float)
         levels *= 2
         if levels > MOST_STEPS:
-            raise InfeasibleError(
-                f"a deflection of {limit:g} m needs more than {MOST_STEPS * step:g} m of height: no such link"
-            )
+            raise _too_high(step, length, f"a deflection of {limit:g} m")

@@ -1,7 +1,8 @@
 """A planned move followed in closed loop."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
@@ -19,7 +20,7 @@ from planner.cli.options import (
     vehicle_option,
 )
 from planner.cli.printing import ANSWER_IS_NO, STYLES, new_console, new_table, print_files, print_json, print_lines, tracked
-from planner.targets import parse_hold, parse_pitch, parse_target
+from planner.targets import parse_along, parse_hold, parse_pitch, parse_target
 
 if TYPE_CHECKING:
     from planner.control.study import Study
@@ -39,6 +40,10 @@ if TYPE_CHECKING:
     "--shaper", "shapers", default="none", show_default=True, metavar="NAME,...|all",
     help="none, zv, zvd: impulses that cancel the lowest mode, for half a period or a whole one.",
 )  # fmt: skip
+@click.option("--via", multiple=True, metavar="TARGET", help="As in `boom plan`; may be given again.")
+@click.option("--pass-via", is_flag=True, help="As in `boom plan`.")
+@click.option("--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z", help="As in `boom plan`.")
+@click.option("--jerk-bound", is_flag=True, help="As in `boom plan`.")
 @click.option("--bandwidth", default=6.0, show_default=True, metavar="HZ", help="Natural frequency of the loops' poles.")
 @click.option("--damping", default=1.0, show_default=True, help="Damping ratio of the loops' poles.")
 @click.option("--integral", default=0.3, show_default=True, help="Integral action's pole, as a share of the bandwidth.")
@@ -47,7 +52,11 @@ if TYPE_CHECKING:
 @hold_option
 @payload_option
 @click.option("--payload-error", default=0.0, metavar="KG", help="True payload less the one that the controllers believe in.")
-@click.option("--gust", metavar="FX,FY,FZ,START,DURATION", help="A push on the tip, (1 - cos)/2, in N along frame 1 and s.")
+@click.option(
+    "--gust",
+    metavar="FX,FY,FZ,START,DURATION",
+    help="A push on the tip, (1 - cos)/2, in N along frame 1 and s, within the time simulated: the move and 2 s.",
+)
 @click.option("--rigid-joints", is_flag=True, help="Leave out the gearboxes' elasticity, friction and the links' bending.")
 @click.option("--rigid-links", is_flag=True, help="Leave out the bending of inner link and extension.")
 @click.option("--backlash", is_flag=True, help="With the gearboxes' backlash.")
@@ -70,6 +79,10 @@ def control(
     profiles: str,
     controllers: str,
     shapers: str,
+    via: tuple[str, ...],
+    pass_via: bool,
+    along: str,
+    jerk_bound: bool,
     bandwidth: float,
     damping: float,
     integral: float,
@@ -106,6 +119,7 @@ def control(
     from planner.control.closed_loop import parse_gust
     from planner.control.design import Controller, Goals
     from planner.control.figures import parse_figures
+    from planner.control.plant import Plant
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
     from planner.files import check_writable
@@ -129,6 +143,9 @@ def control(
         settled=settle_mm * 1e-3,
     )
     chosen = [_several("controller", controllers, list(Controller)), _several("shaper", shapers, list(Shaper))]
+    left_out = controllers == "all" and not Plant.of(boom, setup.figures, elastic=setup.elastic, bending=False).elastic
+    if left_out:
+        chosen[0].remove(Controller.STEPPER)
     for name in (loops, errors):
         if name is not None and not name.endswith(".png"):
             raise InputError(f"{name}: a picture is written as .png")
@@ -136,13 +153,25 @@ def control(
         raise InputError("a stepper runs open loop: there is no Bode diagram of it")
     check_report(document)
     check_writable(out, loops, errors, document)
-    ends, held, angle = (parse_target(start), parse_target(goal)), parse_hold(hold), parse_pitch(pitch)
+    ends = parse_target(start), parse_target(goal)
+    path: dict[str, Any] = {
+        "duration": duration,
+        "pitch": parse_pitch(pitch),
+        "hold": parse_hold(hold),
+        "via": [parse_target(text) for text in via],
+        "stop_at_via": not pass_via,
+        "along": parse_along(along),
+        "jerk_bound": jerk_bound,
+        "vehicle": case,
+    }
     moves = [
-        plan_move(boom, *ends, profile=profile, duration=duration, pitch=angle, hold=held, vehicle=case)
+        plan_move(boom, *ends, profile=profile, **path)
         for profile in _several("profile", profiles, list(Profile))
     ]
     names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
     found = study(boom, moves, *names, setup, tracked("simulating"))
+    if left_out:
+        found = replace(found, notes=(*found.notes, "stepper: left out, as it is simulated behind elastic gearboxes alone"))
     written = {}
     if out is not None:
         from planner.recording import write_control_recording

@@ -4,10 +4,11 @@ from typing import Any
 
 import click
 
-from boom_model import InfeasibleError
+from boom_model import InfeasibleError, InputError
 from planner.cli.options import (
     boom_option,
     check_report,
+    given_catalogue,
     json_option,
     load_boom,
     payload_as_option,
@@ -110,6 +111,7 @@ def link(
       boom link --report link.pdf --out-boom lighter.toml
       boom link --link lower --material aluminium --min-height 0.02 --dxf lower.dxf
     """
+    from boom_model import Catalogue
     from planner import link_files, link_report
     from planner.files import check_writable
     from planner.links import LinkTask, default_moves, design_link
@@ -118,6 +120,10 @@ def link(
 
     files = {"recording": out, "picture": picture, "contour": contour, "csv": csv_file, "dxf": dxf, "boom": out_boom}
     files["report"] = document
+    if convergence and not as_json:
+        raise InputError("--convergence is part of the JSON: give --json with it, or --picture")
+    if picture is not None and not picture.endswith(".png"):
+        raise InputError(f"{picture}: a picture is written as .png")
     check_report(document)
     check_writable(*files.values())
     boom = load_boom(boom_file, payload)
@@ -141,12 +147,13 @@ def link(
         payload_as=payload_as,
         links=links,
     )
+    catalogue = Catalogue.load().with_file(given_catalogue())
     planning = tracked("planning with each profile")
     trajectories = [read_csv(motion) for motion in motions]
     for start, goal in moves:
         trajectories += plan_each_profile(boom, parse_target(start), parse_target(goal), planning)
     try:
-        design = design_link(boom, task, trajectories or default_moves(boom, task, planning))
+        design = design_link(boom, task, trajectories or default_moves(boom, task, planning), catalogue)
     except InfeasibleError as error:
         if as_json:
             print_json({"link": name, "load": load, "method": method, "mass_kg": None, "files": {}, "reason": str(error)})

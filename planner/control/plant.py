@@ -19,7 +19,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from boom_model import JOINTS, BaseMotion, Boom, Drive, InputError, gravity_torque, inverse_dynamics, mass_matrix
+from boom_model import (
+    JOINTS,
+    BaseMotion,
+    Boom,
+    Drive,
+    InfeasibleError,
+    InputError,
+    gravity_torque,
+    inverse_dynamics,
+    mass_matrix,
+)
 from boom_model.arrays import Array, read_only
 from boom_model.drives import available_torque, reflected_inertia
 from planner.control.figures import Figures
@@ -198,13 +208,18 @@ def natural_frequencies(plant: Plant, q: Array, stiffness: Array | None = None) 
 
     Raises:
         InputError: no joint is elastic.
+        InfeasibleError: the boom's weight topples it on its elastic joints.
     """
     if not plant.elastic:
         raise InputError("no joint is elastic: nothing swings")
     E = list(plant.elastic)
     K = np.diag(tangent_at_rest(plant, q) if stiffness is None else stiffness) + gravity_stiffness(plant.boom, q)[np.ix_(E, E)]
     squares = np.linalg.eigvals(np.linalg.solve(mass_matrix(plant.boom, q)[np.ix_(E, E)], K))
-    frequencies: Array = np.sqrt(np.maximum(np.sort(squares.real), 0.0)) / (2.0 * np.pi)
+    if not squares.real.min() > 0.0:
+        raise InfeasibleError(
+            "the boom's weight topples it on its elastic joints, motors held: gearboxes or links are too soft"
+        )
+    frequencies: Array = np.sqrt(np.sort(squares.real)) / (2.0 * np.pi)
     return frequencies
 
 

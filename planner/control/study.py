@@ -196,7 +196,9 @@ def study(
         track: iterates over the controllers' periods, and may show how far it is.
 
     Raises:
-        InputError: nothing to simulate, a payload below 0, or a shaper for a plant in which no joint is elastic.
+        InputError: nothing to simulate, a payload below 0, a gust outside the time simulated, or a shaper for a plant in which
+            no joint is elastic.
+        InfeasibleError: the boom's weight topples it on its elastic joints.
     """
     setup = Setup() if setup is None else setup
     if not (moves and controllers and shapers):
@@ -218,6 +220,11 @@ def study(
                 names.append((str(move.profile), str(controller), str(shaper)))
     designs = [_design(plant, model, case) for case in cases[: len(controllers)] if case.controller is not Controller.STEPPER]
     hold = max(case.command.duration for case in cases) + setup.hold
+    if setup.gust is not None and not (setup.gust.start >= 0.0 and setup.gust.start + setup.gust.duration <= hold):
+        gust = setup.gust
+        raise InputError(
+            f"gust from {gust.start:g} s to {gust.start + gust.duration:g} s; it must lie within the simulated 0 to {hold:g} s"
+        )
     run = simulate(
         plant,
         cases,
@@ -370,7 +377,7 @@ def _notes(plant: Plant, setup: Setup, controllers: Sequence[Controller]) -> tup
         notes.append(f"{setup.vehicle.sentence}; the controllers know its slope alone")
     if setup.gust is not None:
         gust = setup.gust
-        notes.append(f"gust on the tip: {gust.force} N at most, from {gust.start:g} s for {gust.duration:g} s (assumed)")
+        notes.append(f"gust on the tip: {gust.force} N at most, from {gust.start:g} s for {gust.duration:g} s (given)")
     goals = setup.goals
     if set(controllers) != {Controller.STEPPER}:
         notes.append(
