@@ -10,7 +10,7 @@ import sys
 
 from boom_model import Boom
 from planner import LinkTask, design_link
-from planner.links import default_moves
+from planner.links.design import default_moves
 from planner.recording import write_link_recording
 
 

@@ -4,7 +4,7 @@ from planner.certificate import Certificate, WorstRatio, certify
 from planner.checks import average_torque
 from planner.comparison import Comparison, Log, compare, read_log
 from planner.constraints import InfeasiblePathError
-from planner.links import LinkDesign, LinkTask, design_link
+from planner.links.design import LinkDesign, LinkTask, design_link
 from planner.missions import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
 from planner.model_export import mjcf, urdf, write_model
 from planner.motion_files import read_motion, write_motion

@@ -8,14 +8,14 @@ from boom_model import JOINTS, BaseMotion, Basis, Boom, Drive, Loads, Origin, in
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, LIMIT_TOLERANCE
 from boom_model.dynamics import PayloadAs
-from planner.actuator_checks import actuator_rows
 from planner.clearance import nearest_approach
-from planner.duty import Duty
-from planner.gearbox_checks import gearbox_rows
-from planner.joint_view import JointView, Shock
-from planner.motor_checks import motor_rows
+from planner.drive_checks.actuator import actuator_rows
+from planner.drive_checks.duty import Duty
+from planner.drive_checks.gearbox import gearbox_rows
+from planner.drive_checks.joint_view import JointView, Shock
+from planner.drive_checks.motor import motor_rows
+from planner.drive_checks.tip import tip_rows
 from planner.rows import Row, Verdict, held, overall
-from planner.tip_checks import tip_rows
 from planner.trajectory import Trajectory
 
 __all__ = ["ANGLE_CHECKS", "Row", "Shock", "Verdict", "average_torque", "check_rows", "drive_rows", "joint_views", "overall"]

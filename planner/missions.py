@@ -19,7 +19,7 @@ from boom_model import BaseMotion, Basis, Boom, InfeasibleError, InputError, Ori
 from boom_model.arrays import Array, read_only
 from boom_model.dynamics import PayloadAs
 from boom_model.toml_file import Positive, Table, read_toml
-from planner.duty import Duty, trapezoid_weights
+from planner.drive_checks.duty import Duty, trapezoid_weights
 from planner.legs import legs
 from planner.planning import CHECKS_PER_STEP, check
 from planner.report import Report

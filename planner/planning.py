@@ -22,8 +22,8 @@ from boom_model.dynamics import PayloadAs
 from boom_model.holds import Hold
 from planner.certificate import certify
 from planner.checks import check_rows
-from planner.duty import Duty
-from planner.joint_view import Shock
+from planner.drive_checks.duty import Duty
+from planner.drive_checks.joint_view import Shock
 from planner.legs import Along, legs
 from planner.report import Report, assumptions, torque_peaks
 from planner.stopping import worst_stop

@@ -23,9 +23,9 @@ from boom_model import (
 from boom_model.arrays import scalar
 from boom_model.boom import IS_LENGTH
 from boom_model.dynamics import PayloadAs
-from planner.actuator_checks import actuator_rows
 from planner.checks import drive_rows, joint_views
-from planner.joint_view import JointView
+from planner.drive_checks.actuator import actuator_rows
+from planner.drive_checks.joint_view import JointView
 from planner.missions import Cycle, Mission, check_steady, plan_cycle
 from planner.planning import torques
 from planner.rows import Row, Verdict, overall

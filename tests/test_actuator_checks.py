@@ -7,8 +7,8 @@ import pytest
 
 from boom_model import Basis, Boom, LinearActuator, LinearDrive, Origin, Sourced, screw_torque
 from planner import Trajectory, Verdict, check
-from planner.actuator_checks import actuator_rows
-from planner.duty import Duty
+from planner.drive_checks.actuator import actuator_rows
+from planner.drive_checks.duty import Duty
 from tests.test_drive_checks import row, view
 
 SHEET = Origin(Basis.PRINTED, "this test")

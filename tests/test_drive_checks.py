@@ -9,10 +9,10 @@ from boom_model import Basis, Boom, Catalogue, Origin, Sourced, mesh_efficiency
 from boom_model.drives import motor_torque
 from planner import Trajectory, Verdict, check
 from planner.checks import drive_rows
-from planner.duty import Duty
-from planner.gearbox_checks import gearbox_rows
-from planner.joint_view import JointView, Shock
-from planner.motor_checks import full_step_resonance, longest_dwell, motor_rows
+from planner.drive_checks.duty import Duty
+from planner.drive_checks.gearbox import gearbox_rows
+from planner.drive_checks.joint_view import JointView, Shock
+from planner.drive_checks.motor import full_step_resonance, longest_dwell, motor_rows
 
 BOOM = Boom.load()
 DRIVE = BOOM.drives[1]  # MST342C02 on CBG320160, at 80 V in parallel

@@ -7,7 +7,7 @@ from boom_model import Boom, InputError, body_motion, inner_link_load, inverse_d
 from boom_model.frames import R_LINK_BODY, frame_transforms
 from boom_model.kinematics import frame_motion
 from boom_model.link_design import LINKS, Beam, Material, internal_forces, load_link
-from planner.link_loads import largest_components, link_cases, thesis_load
+from planner.links.loads import largest_components, link_cases, thesis_load
 from planner.trajectory import Trajectory
 from planner.validation import table_3_1_motion
 from tests.oracles import random_states

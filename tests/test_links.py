@@ -15,11 +15,11 @@ from boom_model.link_design import Beam, Material, link_body, load_link, thesis_
 from boom_model.link_design.link import LINKS_FILE
 from boom_model.link_design.thesis_method import THESIS_LOAD
 from planner import cli, plan
-from planner.link_convergence import study
-from planner.link_files import COLUMNS, write_boom, write_contour, write_outline, write_stations
-from planner.link_picture import write_link_picture
-from planner.link_report import to_json, to_markdown
-from planner.links import LinkTask, default_moves, design_link
+from planner.links.convergence import study
+from planner.links.design import LinkTask, default_moves, design_link
+from planner.links.files import COLUMNS, write_boom, write_contour, write_outline, write_stations
+from planner.links.picture import write_link_picture
+from planner.links.report import to_json, to_markdown
 from planner.recording import write_link_recording
 from planner.validation import table_3_1_motion
 

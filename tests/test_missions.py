@@ -260,7 +260,7 @@ def test_an_unknown_mission_lists_those_there_are():
 
 def test_means_of_random_weights_are_those_of_repeated_samples():
     """A sample of weight 3 is the sample three times."""
-    from planner.duty import Duty
+    from planner.drive_checks.duty import Duty
 
     rng = np.random.default_rng(3)
     load, rate, times = rng.normal(size=50), rng.normal(size=50), rng.integers(1, 6, 50)

@@ -112,9 +112,10 @@ def link(
       boom link --link lower --material aluminium --min-height 0.02 --dxf lower.dxf
     """
     from boom_model import Catalogue
-    from planner import link_files, link_report
     from planner.files import check_writable
-    from planner.links import LinkTask, default_moves, design_link
+    from planner.links import files as link_files
+    from planner.links import report as link_report
+    from planner.links.design import LinkTask, default_moves, design_link
     from planner.planning import plan_each_profile
     from planner.trajectory import read_csv
 
@@ -164,7 +165,7 @@ def link(
 
         write_link_recording(out, design)
     if picture is not None:
-        from planner.link_picture import write_link_picture
+        from planner.links.picture import write_link_picture
 
         write_link_picture(picture, design)
     for file, write in (
@@ -176,7 +177,7 @@ def link(
             write(file, design)
     if document is not None:
         from planner.document import write_document
-        from planner.link_picture import link_pictures
+        from planner.links.picture import link_pictures
 
         write_document(document, link_report.to_markdown(design), link_pictures(design))
     if out_boom is not None:
@@ -184,7 +185,7 @@ def link(
     if as_json:
         answer = link_report.to_json(design, written)
         if convergence:
-            from planner.link_convergence import study
+            from planner.links.convergence import study
 
             answer["convergence"] = link_report.convergence_json(study(design))
         print_json(answer)

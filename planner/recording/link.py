@@ -9,9 +9,9 @@ import rerun.blueprint as rrb
 
 from boom_model import JOINTS, forward_kinematics
 from boom_model.frames import R_LINK_BODY
-from planner.link_picture import write_link_picture
-from planner.link_report import title, to_markdown
-from planner.links import LinkDesign
+from planner.links.design import LinkDesign
+from planner.links.picture import write_link_picture
+from planner.links.report import title, to_markdown
 from planner.recording.layout import eye_of, scene, shown_beside, text
 from planner.recording.palette import COLORS, LIMIT_COLOR, PAYLOAD_COLOR
 from planner.recording.plots import Bundle

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from boom_model import Basis, Drive, Gearbox, Origin, wind_up
-from planner.joint_view import JointView, Shock
+from planner.drive_checks.joint_view import JointView, Shock
 from planner.rows import Row, Verdict
 
 FAMILY_LIFE = 35_000.0 * 3600.0

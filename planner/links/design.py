@@ -35,7 +35,7 @@ from boom_model.link_design.beam import Forces
 from boom_model.link_design.exact import buckling_load, pressed
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
-from planner.link_loads import largest_components, link_cases, thesis_load
+from planner.links.loads import largest_components, link_cases, thesis_load
 from planner.planning import check, plan, plan_each_profile
 from planner.rows import Verdict
 from planner.tracking import Track
@@ -122,7 +122,7 @@ class Check:
 
 
 INSIDE = (0.1, 0.9)
-"""Shares of the length between which plate and beam are compared: beyond, a plate's stress is that of its held or loaded edge."""
+"""Shares of the length between which plate and beam are compared: a plate's stress beyond is that of its held or loaded edge."""
 
 
 @dataclass(frozen=True)

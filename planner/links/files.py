@@ -10,7 +10,7 @@ from boom_model.boom_file import BOOM_FILE
 from boom_model.errors import InputError
 from boom_model.link_design import internal_forces
 from planner.files import replacing
-from planner.links import LinkDesign
+from planner.links.design import LinkDesign
 
 COLUMNS = (
     "x_m",

@@ -9,9 +9,9 @@ import numpy as np
 from boom_model.arrays import Array
 from boom_model.link_design import internal_forces, von_mises
 from planner.files import replacing
-from planner.link_convergence import PLACES, study
-from planner.link_report import title
-from planner.links import LinkDesign
+from planner.links.convergence import PLACES, study
+from planner.links.design import LinkDesign
+from planner.links.report import title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,7 +6,7 @@ import numpy as np
 
 from boom_model import Basis, Boom, Origin, gear_frequencies, tip_deflection
 from boom_model.arrays import Array
-from planner.duty import Duty
+from planner.drive_checks.duty import Duty
 from planner.rows import Row, Verdict, held, told
 from planner.trajectory import Trajectory
 

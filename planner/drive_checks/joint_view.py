@@ -6,7 +6,7 @@ import numpy as np
 
 from boom_model import Basis, Origin
 from boom_model.arrays import Array, Mask
-from planner.duty import Duty
+from planner.drive_checks.duty import Duty
 from planner.rows import Row, guided, held, told
 from planner.trajectory import Trajectory
 

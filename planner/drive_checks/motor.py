@@ -7,7 +7,7 @@ import numpy as np
 from boom_model import Basis, Drive, Motor, Origin, mesh_efficiency
 from boom_model.arrays import Array
 from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque, speed_for_torque
-from planner.joint_view import JointView
+from planner.drive_checks.joint_view import JointView
 from planner.rows import SAMPLING_SLACK, Row, Verdict
 
 LOW_SPEED = 2.0 * np.pi

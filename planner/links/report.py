@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from boom_model import JOINTS
-from planner.link_convergence import PLACES, Convergence
-from planner.links import INSIDE, LinkDesign
+from planner.links.convergence import PLACES, Convergence
+from planner.links.design import INSIDE, LinkDesign
 from planner.markdown import section, table
 from planner.report import assumptions
 

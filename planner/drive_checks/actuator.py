@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from boom_model import Basis, LinearDrive, Origin, screw_torque
-from planner.joint_view import JointView
+from planner.drive_checks.joint_view import JointView
 from planner.rows import Row, Verdict
 
 

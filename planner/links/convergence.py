@@ -8,7 +8,7 @@ import numpy as np
 from boom_model.arrays import Array
 from boom_model.link_design import Limits, least_mass, thesis_design
 from boom_model.link_design.finite_elements import Solution, Theory, solve_beam, solve_plate
-from planner.links import LinkDesign, by_thesis, with_shear
+from planner.links.design import LinkDesign, by_thesis, with_shear
 
 SLICES = (20, 50, 100, 200, 400, 600, 1000)
 STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
