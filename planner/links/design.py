@@ -122,7 +122,7 @@ class Check:
 
 
 INSIDE = (0.1, 0.9)
-"""Shares of the length between which plate and beam are compared: a plate's stress beyond is that of its held or loaded edge."""
+"""Shares of the length between which plate and beam are compared; beyond, a plate's stress is that of its held edge."""
 
 
 @dataclass(frozen=True)
