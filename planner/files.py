@@ -22,6 +22,20 @@ def check_writable(*paths: str | Path | None) -> None:
         os.unlink(_beside(Path(path)))
 
 
+def named_file(folder: Path, name: str, kind: str) -> Path:
+    """A TOML file by its name in a folder of the toolkit, or by its path (a name that ends in .toml).
+
+    Raises:
+        InputError: no file of that name; lists those there are.
+    """
+    if name.endswith(".toml"):
+        return Path(name)
+    known = sorted(path.stem for path in folder.glob("*.toml"))
+    if name not in known:
+        raise InputError(f"unknown {kind} {name!r}; there are: {', '.join(known)}, or a FILE.toml")
+    return folder / f"{name}.toml"
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[str]:
     """A temporary name beside `path` to write to; moved onto `path` when the block ends well, removed when it does not.

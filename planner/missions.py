@@ -20,6 +20,7 @@ from boom_model.arrays import Array, read_only
 from boom_model.dynamics import PayloadAs
 from boom_model.toml_file import Positive, Table, read_toml
 from planner.drive_checks.duty import Duty, trapezoid_weights
+from planner.files import named_file
 from planner.legs import legs
 from planner.planning import CHECKS_PER_STEP, check
 from planner.report import Report
@@ -124,13 +125,7 @@ def load_mission(name: str) -> Mission:
     Raises:
         InputError: no such mission, or the file cannot be read or is malformed; the key is named.
     """
-    if name.endswith(".toml"):
-        path = Path(name)
-    elif name in named_missions():
-        path = _FOLDER / f"{name}.toml"
-    else:
-        raise InputError(f"unknown mission {name!r}; there are: {', '.join(named_missions())}, or a FILE.toml")
-    table = read_toml(path, _MissionTable)
+    table = read_toml(named_file(_FOLDER, name, "mission"), _MissionTable)
     return Mission(table.name, Origin(Basis(table.basis), table.source), table)
 
 

@@ -13,6 +13,7 @@ from boom_model import Basis, InputError, Origin
 from boom_model.arrays import Array, checked
 from boom_model.base_motion import BaseMotion, up_on_slope
 from boom_model.toml_file import Finite, NonNegative, Positive, Table, read_toml
+from planner.files import named_file
 
 _FOLDER = Path(str(files("planner") / "vehicle_cases"))
 
@@ -155,13 +156,7 @@ def load_case(name: str) -> VehicleCase:
     Raises:
         InputError: no such case, or the file cannot be read or is malformed; the key is named.
     """
-    if name.endswith(".toml"):
-        path = Path(name)
-    elif name in named_cases():
-        path = _FOLDER / f"{name}.toml"
-    else:
-        raise InputError(f"unknown vehicle case {name!r}; there are: {', '.join(named_cases())}, or a FILE.toml")
-    table = read_toml(path, _CaseTable)
+    table = read_toml(named_file(_FOLDER, name, "vehicle case"), _CaseTable)
     track, shock = table.track, table.shock
     direction = np.array([0.0, 0.0, 1.0] if shock is None else shock.direction)
     length = float(np.linalg.norm(direction))
