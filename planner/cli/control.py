@@ -164,10 +164,7 @@ def control(
         "jerk_bound": jerk_bound,
         "vehicle": case,
     }
-    moves = [
-        plan_move(boom, *ends, profile=profile, **path)
-        for profile in _several("profile", profiles, list(Profile))
-    ]
+    moves = [plan_move(boom, *ends, profile=profile, **path) for profile in _several("profile", profiles, list(Profile))]
     names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
     found = study(boom, moves, *names, setup, tracked("simulating"))
     if left_out:
