@@ -165,6 +165,13 @@ def test_a_boom_that_topples_on_its_springs_is_no_answer(boom):  # noqa: F811
     assert err.count("\n") == 1
 
 
+def test_a_move_through_a_target_is_followed(boom):  # noqa: F811
+    options = ("--controller", "pid", "--via", "q=90,55,170,0.97,0", "--json")
+    stops, passes = (json.loads(boom(*QUICK, *options, *more)[1])["cases"][0] for more in ((), ("--pass-via",)))
+    assert stops["outcome"] == passes["outcome"] == "follows"
+    assert passes["duration_s"] < stops["duration_s"]
+
+
 def test_a_gust_that_was_given_is_not_called_assumed(boom):  # noqa: F811
     _, out, _ = boom(*QUICK, "--controller", "pid", "--gust", "0,0,-30,0.1,0.2")
     assert "gust on the tip: (0.0, 0.0, -30.0) N at most, from 0.1 s for 0.2 s (given)" in out
