@@ -156,7 +156,8 @@ def load_case(name: str) -> VehicleCase:
     Raises:
         InputError: no such case, or the file cannot be read or is malformed; the key is named.
     """
-    table = read_toml(named_file(_FOLDER, name, "vehicle case"), _CaseTable)
+    path = named_file(_FOLDER, name, "vehicle case")
+    table = read_toml(path, _CaseTable)
     track, shock = table.track, table.shock
     direction = np.array([0.0, 0.0, 1.0] if shock is None else shock.direction)
     length = float(np.linalg.norm(direction))

@@ -59,12 +59,12 @@ def test_spring_twist_energy_and_tangent_belong_together(backlash):
     q = random_states(BOOM, 200, rng)[0]
     torque = rng.uniform(-250.0, 250.0, (200, 2))
     twist = twist_under(plant, q, torque)
-    np.testing.assert_allclose(spring_torque(plant, q, twist), torque, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(spring_torque(plant, q, twist), torque, rtol=0, atol=5e-13)
     direction = rng.normal(size=(200, 2))
     work = derivative(lambda s: spring_energy(plant, q, twist + s * direction), h=1e-9)
-    np.testing.assert_allclose(work, np.sum(torque * direction, axis=-1), rtol=0, atol=2e-3)
+    np.testing.assert_allclose(work, np.sum(torque * direction, axis=-1), rtol=0, atol=2.5e-6)
     slope = derivative(lambda s: spring_torque(plant, q, twist + s), h=1e-9)
-    np.testing.assert_allclose(slope, tangent_stiffness(plant, q, torque), rtol=1e-4)
+    np.testing.assert_allclose(slope, tangent_stiffness(plant, q, torque), rtol=1e-8)
 
 
 def test_backlash_leaves_a_gap_without_torque():

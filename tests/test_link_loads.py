@@ -42,7 +42,7 @@ def test_inner_load_is_that_of_the_dynamics(payload_as):
     moving = motion()
     cases, when = link_cases(BOOM, load_link(BOOM, "inner"), [moving], payload_as=payload_as)
     loads = inverse_dynamics(BOOM, moving.q, moving.qd, moving.qdd, payload_as=payload_as)
-    np.testing.assert_allclose(cases.end_force, inner_link_load(moving.q, loads.pins)[:, :2], rtol=1e-10, atol=1e-8)
+    np.testing.assert_allclose(cases.end_force, inner_link_load(moving.q, loads.pins)[:, :2], rtol=0, atol=4e-12)
     np.testing.assert_array_equal(when[:, 1], moving.t)
 
 
@@ -65,7 +65,7 @@ def test_end_load_and_own_inertia_are_in_balance_with_the_joint(name):
     torque = (moment * n).sum(axis=-1) - length * cases.end_force[:, 1]
     tau = inverse_dynamics(BOOM, q, qd, qdd).tau
     expected = {"inner": tau[:, 1], "lower": tau[:, 2], "outer": np.zeros(len(q))}[name]
-    np.testing.assert_allclose(torque, expected, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(torque, expected, rtol=0, atol=5e-12)
 
 
 def test_extension_bears_the_tool_at_the_wrist():
@@ -77,7 +77,7 @@ def test_extension_bears_the_tool_at_the_wrist():
     rod, held = body_motion(BOOM, q, moving.qd, moving.qdd)["extension"], BOOM.bodies["extension"]
     along, _ = axes(q, q[:, 2])
     own = held.mass * ((rod.acceleration + UP) * -along).sum(axis=-1)
-    np.testing.assert_allclose(own - cases.end_force[:, 0], loads.tau[:, 3], rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(own - cases.end_force[:, 0], loads.tau[:, 3], rtol=0, atol=5e-13)
     np.testing.assert_allclose(cases.end_moment, loads.tau[:, 4])
     np.testing.assert_allclose(cases.clamp, link.length - np.clip(q[:, 3], 0.0, None), atol=1e-8)
 
@@ -93,7 +93,7 @@ def test_accelerations_are_those_of_the_pins(name):
         felt = frames.acceleration[:, frame - 1] + [0.0, 0.0, BOOM.gravity]
         e, p = axes(moving.q, moving.q[:, 2] if name == "lower" else moving.q[:, 1])
         at = cases.acceleration[..., 0] + cases.acceleration[..., 1] * x
-        np.testing.assert_allclose(at, np.stack([(felt * e).sum(-1), (felt * p).sum(-1)], axis=-1), atol=1e-9)
+        np.testing.assert_allclose(at, np.stack([(felt * e).sum(-1), (felt * p).sum(-1)], axis=-1), rtol=0, atol=3e-14)
 
 
 def test_links_stand_where_the_frames_do():

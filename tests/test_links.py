@@ -92,7 +92,7 @@ def test_a_designed_link_is_held_by_its_own_checks(new):
     assert names["Timoshenko beam"].deflection == pytest.approx(0.01, rel=1e-3)
     assert names["plane stress"].deflection <= 0.01 * 1.001
     assert all(c.stress <= 175e6 for c in new.checks)
-    assert new.stress_check.by_elements == pytest.approx(new.stress_check.own, rel=1e-2)
+    assert new.stress_check.by_elements == pytest.approx(new.stress_check.own, rel=9e-3)
     assert new.mass < 0.6 * 3.72
     assert new.exact.gap < 1e-5
     assert new.tapered_load >= 2.0 * new.pressed * (1.0 - 1e-5)
@@ -132,7 +132,7 @@ def test_convergence_studies(old, new):
     assert len(by_optimum.deflections) == 4
     assert by_optimum.deflections["Timoshenko beam"][-1, 1] == pytest.approx(0.01, rel=1e-3)
     last = by_thesis.stresses[:, 1:]
-    np.testing.assert_allclose(last[-1, 1:4], np.interp([0.3, 0.5, 0.7], old.beam.stations, old.stress), rtol=0.02)
+    np.testing.assert_allclose(last[-1, 1:4], np.interp([0.3, 0.5, 0.7], old.beam.stations, old.stress), rtol=8e-3)
     assert (np.abs(np.diff(last, axis=0)[-1]) < np.abs(np.diff(last, axis=0)[0])).all()
 
 
@@ -226,7 +226,7 @@ def test_the_command_for_people_and_its_moves(boom):
         (("--method", "thesis", "--no-shear"), 2, "knows no shear"),
         (("--method", "thesis", "--no-buckling"), 2, "does not hold buckling"),
         (("--method", "thesis", "--largest-components"), 2, "always takes the largest components"),
-        (("--load", "thesis", "--largest-components"), 2, "it has no largest components"),
+        (("--load", "thesis", "--largest-components"), 2, "has no largest components"),
         (("--convergence",), 2, "--convergence is part of the JSON"),
         (("--method", "thesis", "--step", "1e-9"), 2, "step is 1e-09 m"),
     ],
