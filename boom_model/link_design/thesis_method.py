@@ -86,11 +86,7 @@ def thesis_design(
         step: delta-H [m].
 
     Raises:
-<<<<<<< HEAD
         InputError: a limit or the step is not above 0, the step is too small for the heights, or the beam is no cantilever.
-=======
-        InputError: a limit or the step is not above 0, the step is too small for a beam's heights, or it is no cantilever.
->>>>>>> fixlink
         InfeasibleError: a station would be more than MOST_STEPS steps high, and that more than a fifth of the length.
     """
     if beam.support != "cantilever":
