@@ -166,7 +166,7 @@ def test_a_boom_that_topples_on_its_springs_is_no_answer(boom):  # noqa: F811
 
 
 def test_a_move_through_a_target_is_followed(boom):  # noqa: F811
-    options = ("--controller", "pid", "--via", "q=90,55,170,0.97,0", "--json")
+    options = ("--controller", "pid", "--via", "q=90,58.5,177,0.975,0", "--json")
     stops, passes = (json.loads(boom(*QUICK, *options, *more)[1])["cases"][0] for more in ((), ("--pass-via",)))
     assert stops["outcome"] == passes["outcome"] == "follows"
     assert passes["duration_s"] < stops["duration_s"]
