@@ -14,21 +14,6 @@ from boom_model.boom_file import BOOM_FILE
 from planner import Profile, cli, plan, read_csv
 
 
-@pytest.fixture
-def boom(tmp_path, monkeypatch, capsys):
-    """Runs the command in an empty folder; returns exit code, standard output and standard error."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["boom", *arguments])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        captured = capsys.readouterr()
-        return stop.value.code or 0, captured.out, captured.err
-
-    return run
-
-
 def test_plan_does_the_main_job(boom, tmp_path):
     code, out, err = boom("plan", "transport", "phenotyping", "--csv", "move.csv")
     assert (code, err) == (0, "")

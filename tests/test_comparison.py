@@ -25,7 +25,7 @@ from boom_model import (
     jacobian,
 )
 from boom_model.arrays import Array
-from planner import Trajectory, cli, plan, write_csv
+from planner import Trajectory, plan, write_csv
 from planner.comparison import Log, Smoothed, compare, read_log, smoothed
 from planner.recording import write_comparison_recording
 from planner.trajectory import read_csv
@@ -268,20 +268,11 @@ def test_the_recording_holds_both(tmp_path: Path):
 
 
 @pytest.fixture
-def boom(tmp_path, monkeypatch, capsys):
-    """Runs the command in a folder with a plan and a log; returns exit code, standard output and standard error."""
-    monkeypatch.chdir(tmp_path)
+def boom(boom):
+    """The command, in a folder with a plan and a log."""
     write_csv(MOVE, "move.csv", FINE.loads.tau[: MOVE.t.size])
     write_log(Path("log.csv"), MOVE.t + 30.0, noisy(MOVE.t, MOVE.q))
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["boom", *arguments])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        captured = capsys.readouterr()
-        return stop.value.code or 0, captured.out, captured.err
-
-    return run
+    return boom
 
 
 def test_compare_prints_a_table_or_json_and_records(boom):

@@ -12,7 +12,6 @@ from planner import plan
 from planner.control import Controller, Figures, Goals, Outcome, Setup, Shaper, study
 from planner.control.study import _outcome, _overshoot, _residual
 from planner.recording import write_control_recording
-from tests.test_cli import boom  # noqa: F401  the command in an empty folder
 
 BOOM = Boom.load()
 
@@ -140,7 +139,7 @@ def test_friction_and_a_wrong_payload_are_the_controllers_to_bear():
 QUICK = ("control", "phenotyping", "q=90,57,175,0.95,0", "--set", "rate_Hz=500")
 
 
-def test_the_command_reports_and_leaves_its_files(boom, tmp_path):  # noqa: F811
+def test_the_command_reports_and_leaves_its_files(boom, tmp_path):
     files = ("--out", "c.rrd", "--loops", "l.png", "--errors", "e.png")
     code, out, err = boom(*QUICK, "--controller", "pid,computed-torque", "--shaper", "none,zv", *files)
     assert (code, err) == (0, "")
@@ -151,33 +150,33 @@ def test_the_command_reports_and_leaves_its_files(boom, tmp_path):  # noqa: F811
     assert (tmp_path / "l.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_all_controllers_of_a_rigid_boom_are_those_that_it_can_have(boom):  # noqa: F811
+def test_all_controllers_of_a_rigid_boom_are_those_that_it_can_have(boom):
     code, out, err = boom(*QUICK, "--rigid-joints")
     assert (code, err) == (0, "")
     assert "4 of 4 cases: follows" in out
     assert "Note: stepper: left out" in out
 
 
-def test_a_boom_that_topples_on_its_springs_is_no_answer(boom):  # noqa: F811
+def test_a_boom_that_topples_on_its_springs_is_no_answer(boom):
     code, out, err = boom(*QUICK, "--controller", "pid", "--set", "inner_height_mm=0.5")
     assert (code, out) == (1, "")
     assert "the boom's weight topples it on its elastic joints" in err
     assert err.count("\n") == 1
 
 
-def test_a_move_through_a_target_is_followed(boom):  # noqa: F811
+def test_a_move_through_a_target_is_followed(boom):
     options = ("--controller", "pid", "--via", "q=90,58.5,177,0.975,0", "--json")
     stops, passes = (json.loads(boom(*QUICK, *options, *more)[1])["cases"][0] for more in ((), ("--pass-via",)))
     assert stops["outcome"] == passes["outcome"] == "follows"
     assert passes["duration_s"] < stops["duration_s"]
 
 
-def test_a_gust_that_was_given_is_not_called_assumed(boom):  # noqa: F811
+def test_a_gust_that_was_given_is_not_called_assumed(boom):
     _, out, _ = boom(*QUICK, "--controller", "pid", "--gust", "0,0,-30,0.1,0.2")
     assert "gust on the tip: (0.0, 0.0, -30.0) N at most, from 0.1 s for 0.2 s (given)" in out
 
 
-def test_the_command_fails_where_the_boom_does(boom, tmp_path):  # noqa: F811
+def test_the_command_fails_where_the_boom_does(boom, tmp_path):
     code, out, _ = boom(*QUICK, "--controller", "stepper", "--payload-error", "60", "--json")
     answer = json.loads(out)
     assert (code, answer["ok"]) == (1, False)
@@ -206,7 +205,7 @@ def test_the_command_fails_where_the_boom_does(boom, tmp_path):  # noqa: F811
         (("--controller", "pid", "--gust", "0,0,-30,-1,0.5"), "gust from -1 s to -0.5 s; it must lie within"),
     ],
 )
-def test_bad_input_is_named(boom, tmp_path, options, message):  # noqa: F811
+def test_bad_input_is_named(boom, tmp_path, options, message):
     code, out, err = boom(*QUICK, *options)
     assert (code, out) == (2, "")
     assert message in err

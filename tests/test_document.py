@@ -17,7 +17,6 @@ from planner.document import write_document
 from planner.drive_pictures import drive_pages
 from planner.move_pictures import move_pictures
 from planner.report import cells
-from tests.test_cli import boom  # noqa: F401  the command in an empty folder
 
 PNG = b"\x89PNG\r\n\x1a\n"
 TITLES = ["Positions", "Velocities", "Torques", "Drive of inner", "Drive of lower", "Tip"]
@@ -127,7 +126,7 @@ def test_markdown_lies_beside_its_pictures(folder):
     assert f"`boom plan transport phenotyping --via 'q=1 2'` with boom {version('boom')}, numpy" in text
 
 
-def test_a_bar_within_a_cell_makes_no_column(boom, tmp_path):  # noqa: F811
+def test_a_bar_within_a_cell_makes_no_column(boom, tmp_path):
     code, _, err = boom(*CONTROL, "--report", "x.html")
     assert (code, err) == (0, "")
     found = of_html(tmp_path / "x.html")
@@ -167,7 +166,7 @@ JOBS = {
 
 
 @pytest.mark.parametrize("job", JOBS)
-def test_every_job_with_a_report_writes_it(boom, tmp_path, move, job):  # noqa: F811
+def test_every_job_with_a_report_writes_it(boom, tmp_path, move, job):
     arguments, titles, assumed = JOBS[job]
     write_csv(move.trajectory, "m.csv")
     code, out, err = boom(*arguments, "--report", "x.html")
@@ -197,7 +196,7 @@ def test_every_job_with_a_report_writes_it(boom, tmp_path, move, job):  # noqa: 
     ("name", "message"),
     [("x.docx", "x.docx: a report is written as .md, .html, .pdf"), ("none/x.pdf", "none/x.pdf: cannot be written")],
 )
-def test_a_report_that_cannot_be_written_is_refused_before_the_work(boom, tmp_path, arguments, name, message):  # noqa: F811
+def test_a_report_that_cannot_be_written_is_refused_before_the_work(boom, tmp_path, arguments, name, message):
     (tmp_path / "m.csv").write_text("t,q1,q2,q3,q4,q5\n0,0,1,3,0,0\n1,0,1,3,0,0\n")
     code, out, err = boom(*arguments, "--report", name)
     assert (code, out) == (2, "")

@@ -14,7 +14,7 @@ from boom_model.catalogue import CATALOGUE_FILE
 from boom_model.link_design import Beam, Material, link_body, load_link, thesis_design
 from boom_model.link_design.link import LINKS_FILE
 from boom_model.link_design.thesis_method import THESIS_LOAD
-from planner import cli, plan
+from planner import plan
 from planner.links.convergence import study
 from planner.links.design import LinkTask, default_moves, design_link
 from planner.links.files import COLUMNS, write_boom, write_contour, write_outline, write_stations
@@ -38,20 +38,6 @@ def old():
 def new():
     move = plan(BOOM, "transport", "phenotyping", duration=5.0).trajectory
     return design_link(BOOM, LinkTask(slices=200), [move])
-
-
-@pytest.fixture
-def boom(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["boom", *arguments])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        captured = capsys.readouterr()
-        return stop.value.code or 0, captured.out, captured.err
-
-    return run
 
 
 def test_the_thesis_contour_and_the_fittings_are_the_thesis_link(old):
