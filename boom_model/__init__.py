@@ -1,12 +1,13 @@
 """The boom itself: geometry, bodies, limits and drives, and its kinematics and dynamics. It knows nothing of time
 profiles, screens or files, its own TOML aside."""
 
-from boom_model.base_motion import BaseMotion, up_on_slope
 from boom_model.boom import JOINTS, Body, Boom, Friction, Geometry, Limits, Mount
-from boom_model.catalogue import Catalogue
-from boom_model.drives import Drive, Gearbox, Motor, Winding, Wiring, mesh_efficiency
-from boom_model.dynamics import Loads, PinForces, inner_link_load, inverse_dynamics
-from boom_model.equations_of_motion import (
+from boom_model.drives.catalogue import Catalogue
+from boom_model.drives.drive import Drive, Gearbox, Motor, Winding, Wiring, mesh_efficiency
+from boom_model.drives.gear_compliance import TipDeflection, gear_frequencies, tip_deflection, wind_up
+from boom_model.drives.linear_actuator import LinearActuator, LinearDrive, screw_torque
+from boom_model.dynamics.base_motion import BaseMotion, up_on_slope
+from boom_model.dynamics.equations_of_motion import (
     forward_dynamics,
     gravity_torque,
     kinetic_energy,
@@ -14,10 +15,10 @@ from boom_model.equations_of_motion import (
     potential_energy,
     velocity_torque,
 )
+from boom_model.dynamics.newton_euler import Loads, PinForces, inner_link_load, inverse_dynamics
+from boom_model.dynamics.torque_breakdown import Breakdown, breakdown
 from boom_model.errors import BoomError, InfeasibleError, InputError
-from boom_model.frames import body_transforms, dh_rows, frame_transforms
-from boom_model.gear_compliance import TipDeflection, gear_frequencies, tip_deflection, wind_up
-from boom_model.holds import (
+from boom_model.kinematics.constraints import (
     ActuatorAngle,
     ActuatorHorizontal,
     ChoiceHold,
@@ -30,15 +31,7 @@ from boom_model.holds import (
     NearestHorizontal,
     NearestPose,
 )
-from boom_model.inverse_kinematics import (
-    Branches,
-    Solution,
-    Solutions,
-    inverse_kinematics,
-    inverse_kinematics_of_pose,
-    solve_branches,
-)
-from boom_model.kinematics import (
+from boom_model.kinematics.forward import (
     BodyMotion,
     FrameMotion,
     TipPose,
@@ -50,10 +43,17 @@ from boom_model.kinematics import (
     manipulability,
     transmission_angle,
 )
-from boom_model.linear_actuator import LinearActuator, LinearDrive, screw_torque
+from boom_model.kinematics.frames import body_transforms, dh_rows, frame_transforms
+from boom_model.kinematics.inverse import (
+    Branches,
+    Solution,
+    Solutions,
+    inverse_kinematics,
+    inverse_kinematics_of_pose,
+    solve_branches,
+)
+from boom_model.kinematics.reach import NearestReachable, ReachMap, nearest_reachable, reach_map
 from boom_model.provenance import Basis, Origin, Sourced
-from boom_model.reach import NearestReachable, ReachMap, nearest_reachable, reach_map
-from boom_model.torque_breakdown import Breakdown, breakdown
 
 __all__ = [
     "JOINTS",

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
-from boom_model.drives import Drive
+from boom_model.drives.drive import Drive
+from boom_model.drives.linear_actuator import LinearDrive
 from boom_model.errors import InputError
 from boom_model.keep_out import KeepOut
-from boom_model.linear_actuator import LinearDrive
 from boom_model.provenance import Origin, Sourced
 
 JOINTS = ("yaw", "inner", "lower", "extension", "wrist")

@@ -11,11 +11,11 @@ from pydantic import AfterValidator, Field, model_validator
 
 from boom_model.arrays import Array, checked, read_only
 from boom_model.boom import JOINTS, MOVING_BODIES, Body, Boom, Friction, Geometry, Limits, Mount
-from boom_model.catalogue import CATALOGUE_FILE, Catalogue
-from boom_model.drives import Drive, Wiring
+from boom_model.drives.catalogue import CATALOGUE_FILE, Catalogue
+from boom_model.drives.drive import Drive, Wiring
+from boom_model.drives.linear_actuator import LinearDrive
 from boom_model.errors import InputError
 from boom_model.keep_out import Box, Capsule, KeepOut
-from boom_model.linear_actuator import LinearDrive
 from boom_model.provenance import Basis, Origin, Sourced
 from boom_model.toml_file import Finite, NonNegative, Positive, Table, read_toml
 

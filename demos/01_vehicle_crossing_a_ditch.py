@@ -12,8 +12,8 @@ import numpy as np
 
 from boom_model import Boom
 from planner import plan
+from planner.motion.vehicle import load_case
 from planner.recording import write_recording
-from planner.vehicle import load_case
 
 
 def main(out: str = "ditch.rrd") -> None:

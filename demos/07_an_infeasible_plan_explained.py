@@ -8,7 +8,7 @@ single changes that work; each has been planned again before it is offered.
 
 from boom_model import Boom, InfeasibleError
 from planner import plan
-from planner.remedies import remedies
+from planner.suggestions import remedies
 
 
 def main() -> None:

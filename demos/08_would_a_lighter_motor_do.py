@@ -9,9 +9,9 @@ import sys
 
 from boom_model import Boom, Catalogue
 from planner import check_cycle, choose, load_mission, plan_cycle
-from planner.drive_pictures import write_drive_picture
 from planner.planning import torques
-from planner.sizing import parse_variant
+from planner.reports.drive_pictures import write_drive_picture
+from planner.sizing.choice import parse_variant
 
 
 def main(out: str = "drives.png") -> None:

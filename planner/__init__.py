@@ -1,23 +1,23 @@
 """From targets to motions that have been checked, and to what people keep of them: reports, recordings, CSV."""
 
-from planner.certificate import Certificate, WorstRatio, certify
-from planner.checks import average_torque
-from planner.comparison import Comparison, Log, compare, read_log
-from planner.constraints import InfeasiblePathError
+from planner.checks.certificate import Certificate, WorstRatio, certify
+from planner.checks.motion_checks import average_torque
+from planner.checks.rows import Row, Verdict
+from planner.checks.stopping import Stop, WorstStop, stop
+from planner.experiments.comparison import Comparison, Log, compare, read_log
+from planner.exports.robot_models import mjcf, urdf, write_model
 from planner.links.design import LinkDesign, LinkTask, design_link
-from planner.missions import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
-from planner.model_export import mjcf, urdf, write_model
-from planner.motion_files import read_motion, write_motion
-from planner.path import JointLine, Path
+from planner.missions.mission import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
+from planner.motion.motion_files import read_motion, write_motion
+from planner.motion.trajectory import Trajectory, read_csv, sample, write_csv
+from planner.paths.path import JointLine, Path
+from planner.paths.targets import TipTarget, parse_hold, parse_pitch, parse_target
 from planner.planning import Move, check, examine, plan, torques
-from planner.report import Report
-from planner.rows import Row, Verdict
-from planner.sizing import Adapt, Choice, Judged, candidates, choose, size
-from planner.stopping import Stop, WorstStop, stop
-from planner.targets import TipTarget, parse_hold, parse_pitch, parse_target
-from planner.time_law import Motion, TimeLaw
-from planner.timing import Profile
-from planner.trajectory import Trajectory, read_csv, sample, write_csv
+from planner.reports.report import Report
+from planner.sizing.choice import Adapt, Choice, Judged, candidates, choose, size
+from planner.timing.path_limits import InfeasiblePathError
+from planner.timing.time_law import Motion, TimeLaw
+from planner.timing.timing import Profile
 
 __all__ = [
     "Adapt",

@@ -18,21 +18,21 @@ from boom_model import (
     up_on_slope,
 )
 from boom_model.arrays import Array, checked
-from boom_model.dynamics import PayloadAs
-from boom_model.holds import Hold
-from planner.certificate import certify
-from planner.checks import check_rows
-from planner.drive_checks.duty import Duty
-from planner.drive_checks.joint_view import Shock
-from planner.legs import Along, legs
-from planner.report import Report, assumptions, torque_peaks
-from planner.stopping import worst_stop
-from planner.targets import Target, resolve
-from planner.time_law import Motion
-from planner.timing import Profile, Timing, timed
-from planner.tracking import Track
-from planner.trajectory import STEP, Trajectory, at_rest, check_size, joined, sample
-from planner.vehicle import VehicleCase, base_motion
+from boom_model.dynamics.newton_euler import PayloadAs
+from boom_model.kinematics.constraints import Hold
+from planner.checks.certificate import certify
+from planner.checks.drives.duty import Duty
+from planner.checks.drives.joint_view import Shock
+from planner.checks.motion_checks import check_rows
+from planner.checks.stopping import worst_stop
+from planner.motion.trajectory import STEP, Trajectory, at_rest, check_size, joined, sample
+from planner.motion.vehicle import VehicleCase, base_motion
+from planner.paths.legs import Along, legs
+from planner.paths.targets import Target, resolve
+from planner.progress import Track
+from planner.reports.report import Report, assumptions, torque_peaks
+from planner.timing.time_law import Motion
+from planner.timing.timing import Profile, Timing, timed
 
 CHECKS_PER_STEP = 10
 """A planned move is checked on a grid this many times finer than it is sampled."""

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from boom_model import Boom, InfeasibleError
-from planner.constraints import jerk_stretch
-from planner.markdown import table
+from planner.paths.targets import Target
 from planner.planning import Move, plan
-from planner.report import Report
-from planner.targets import Target
-from planner.timing import Profile
-from planner.tracking import Track
+from planner.progress import Track
+from planner.reports.markdown import table
+from planner.reports.report import Report
+from planner.timing.path_limits import jerk_stretch
+from planner.timing.timing import Profile
 
 
 @dataclass(frozen=True)

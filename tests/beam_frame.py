@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 
 from boom_model.arrays import Array
 from boom_model.boom import Body, Boom
-from boom_model.frames import R_LINK_BODY
+from boom_model.kinematics.frames import R_LINK_BODY
 
 ELEMENTS = 24
 ROD = 1.2

@@ -11,8 +11,8 @@ import numpy as np
 
 from boom_model.arrays import Array
 from boom_model.boom import Boom
-from planner.path import Path
-from planner.time_law import Motion
+from planner.paths.path import Path
+from planner.timing.time_law import Motion
 from tests.oracles import pinocchio_inverse_dynamics
 
 DRIVEN = [1, 2]

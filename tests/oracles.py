@@ -17,10 +17,10 @@ import pinocchio
 from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array
-from boom_model.base_motion import BaseMotion
 from boom_model.boom import Body, Boom, Friction
-from boom_model.dynamics import PayloadAs
-from boom_model.frames import BODY_FRAMES, Loop, body_transforms, dh_rows, frame_transforms
+from boom_model.dynamics.base_motion import BaseMotion
+from boom_model.dynamics.newton_euler import PayloadAs
+from boom_model.kinematics.frames import BODY_FRAMES, Loop, body_transforms, dh_rows, frame_transforms
 
 UP = np.array([0.0, 0.0, 1.0])
 

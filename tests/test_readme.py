@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, Catalogue, gravity_torque
-from planner.missions import check_cycle, load_mission, plan_cycle
-from planner.side_by_side import compared, comparison_markdown
-from planner.sizing import Choice, candidates, fitted, parse_variant, size
+from planner.missions.mission import check_cycle, load_mission, plan_cycle
+from planner.reports.side_by_side import compared, comparison_markdown
+from planner.sizing.choice import Choice, candidates, fitted, parse_variant, size
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 BOOM = Boom.load()

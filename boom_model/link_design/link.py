@@ -13,7 +13,7 @@ from boom_model.arrays import Array, read_only
 from boom_model.boom import Body, Boom
 from boom_model.boom_file import Triple, inertia_tensor
 from boom_model.errors import InputError
-from boom_model.frames import R_LINK_BODY
+from boom_model.kinematics.frames import R_LINK_BODY
 from boom_model.link_design.beam import Beam, Support
 from boom_model.link_design.materials import Material
 from boom_model.provenance import Basis, Origin

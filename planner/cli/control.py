@@ -20,7 +20,7 @@ from planner.cli.options import (
     vehicle_option,
 )
 from planner.cli.printing import ANSWER_IS_NO, STYLES, new_console, new_table, print_files, print_json, print_lines, tracked
-from planner.targets import parse_along, parse_hold, parse_pitch, parse_target
+from planner.paths.targets import parse_along, parse_hold, parse_pitch, parse_target
 
 if TYPE_CHECKING:
     from planner.control.study import Study
@@ -123,9 +123,9 @@ def control(
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
     from planner.files import check_writable
+    from planner.motion.vehicle import load_case
     from planner.planning import plan as plan_move
-    from planner.timing import Profile
-    from planner.vehicle import load_case
+    from planner.timing.timing import Profile
 
     boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
     if not np.isfinite(settle_mm) or not settle_mm > 0.0:
@@ -184,7 +184,7 @@ def control(
                 written[kind] = name
     if document is not None:
         from planner.control.picture import study_pictures
-        from planner.document import write_document
+        from planner.reports.document import write_document
 
         write_document(document, found.to_markdown(), study_pictures(found))
         written["report"] = document

@@ -51,14 +51,14 @@ def mission(
       boom mission field-day --picture drives.png
       boom mission table-2-4 table-3-1 --joint inner --joint lower --report judged.pdf
     """
-    from planner.document import write_document
-    from planner.drive_pictures import drive_pages, write_drive_picture
+    from planner.checks.rows import Verdict
     from planner.files import check_writable
-    from planner.missions import check_cycle, load_mission, plan_cycle
+    from planner.missions.mission import check_cycle, load_mission, plan_cycle
+    from planner.motion.vehicle import load_case
     from planner.planning import torques
-    from planner.rows import Verdict
-    from planner.side_by_side import compared, side_by_side_markdown
-    from planner.vehicle import load_case
+    from planner.reports.document import write_document
+    from planner.reports.drive_pictures import drive_pages, write_drive_picture
+    from planner.reports.side_by_side import compared, side_by_side_markdown
 
     boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
     check_picture(picture)
@@ -139,14 +139,14 @@ def size(
       boom size field-day --variant inner=5.55 --variant payload=5 --report drives.html
     """
     from boom_model import JOINTS, Catalogue
-    from planner.document import write_document
     from planner.files import check_writable
-    from planner.missions import check_steady, load_mission, plan_cycle
-    from planner.report import assumptions
-    from planner.sizing import Adapt, choose, parse_variant, too_high
-    from planner.sizing_pictures import sizing_pictures
-    from planner.sizing_tables import SAVING, motors, no_motion, ranking, saving, sizing_json, sizing_markdown, sizing_notes
-    from planner.vehicle import load_case
+    from planner.missions.mission import check_steady, load_mission, plan_cycle
+    from planner.motion.vehicle import load_case
+    from planner.reports.document import write_document
+    from planner.reports.report import assumptions
+    from planner.sizing.choice import Adapt, choose, parse_variant, too_high
+    from planner.sizing.pictures import sizing_pictures
+    from planner.sizing.tables import SAVING, motors, no_motion, ranking, saving, sizing_json, sizing_markdown, sizing_notes
 
     boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
     check_report(document)

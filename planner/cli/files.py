@@ -29,8 +29,8 @@ def export(motion: str, out: str) -> int:
       boom export move.csv move.parquet
       boom torque move.csv --out torques.csv && boom export torques.csv move.yaml
     """
-    from planner.motion_files import form_of, read_quantities, write_motion
-    from planner.trajectory import trajectory_of
+    from planner.motion.motion_files import form_of, read_quantities, write_motion
+    from planner.motion.trajectory import trajectory_of
 
     form = form_of(out)
     data, notes = read_quantities(motion)
@@ -57,7 +57,7 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     Example:
       boom export-model boom.urdf --payload 8
     """
-    from planner.model_export import write_model
+    from planner.exports.robot_models import write_model
 
     write_model(load_boom(boom_file, payload), out)
     click.echo(f"model: {out}")
@@ -97,10 +97,10 @@ def compare(
     Example:
       boom compare move.csv log.csv --offset best --out both.rrd
     """
-    from planner.comparison import WINDOW, read_log
-    from planner.comparison import compare as compare_motions
+    from planner.experiments.comparison import WINDOW, read_log
+    from planner.experiments.comparison import compare as compare_motions
     from planner.files import check_writable
-    from planner.motion_files import read_motion
+    from planner.motion.motion_files import read_motion
 
     try:
         shift = None if offset == "best" else float(offset)
@@ -138,7 +138,7 @@ def validate(as_json: bool) -> int:
     Example:
       boom validate
     """
-    from planner.validation import validate as validate_model
+    from planner.validation.tables import validate as validate_model
 
     rows = validate_model(Boom.load())
     failed = sum(not row.ok for row in rows)
@@ -169,7 +169,7 @@ def view(recording: str) -> int:
 
 
 def _print_comparison(answer: dict[str, Any]) -> None:
-    from planner.comparison import POSITION_HEADER, TORQUE_HEADER, position_cells, summary, torque_cells
+    from planner.experiments.comparison import POSITION_HEADER, TORQUE_HEADER, position_cells, summary, torque_cells
 
     for title, header, cells in (
         ("Positions, measured less planned", POSITION_HEADER, position_cells),

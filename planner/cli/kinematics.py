@@ -8,7 +8,7 @@ import numpy as np
 from boom_model import InfeasibleError, InputError, inverse_kinematics
 from planner.cli.options import boom_option, hold_option, json_option, load_boom, payload_option, pitch_option
 from planner.cli.printing import new_console, new_table, print_files, print_json
-from planner.targets import parse_hold, parse_pitch, unreachable
+from planner.paths.targets import parse_hold, parse_pitch, unreachable
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
@@ -71,7 +71,7 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
     Example:
       boom reach --hold least-torque --payload 8 --out reach.png
     """
-    from boom_model.reach import reach_map
+    from boom_model.kinematics.reach import reach_map
 
     if not out.endswith((".png", ".rrd")):
         raise InputError(f"{out}: a reach map is written as .png or .rrd")
@@ -105,7 +105,7 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
         "largest_torque_margin": float(margin.max()) if known else None,
     }
     if out.endswith(".png"):
-        from planner.reach_picture import reach_title, write_reach_picture
+        from planner.reports.reach_picture import reach_title, write_reach_picture
 
         write_reach_picture(out, boom, found, reach_title(boom, found))
         answer["files"] = {"picture": out}

@@ -16,7 +16,7 @@ from planner.cli.options import (
     report_option,
 )
 from planner.cli.printing import print_files, print_json, print_lines, print_rows, tracked
-from planner.targets import parse_target
+from planner.paths.targets import parse_target
 
 
 @click.command()
@@ -116,8 +116,8 @@ def link(
     from planner.links import files as link_files
     from planner.links import report as link_report
     from planner.links.design import LinkTask, default_moves, design_link
+    from planner.motion.trajectory import read_csv
     from planner.planning import plan_each_profile
-    from planner.trajectory import read_csv
 
     files = {"recording": out, "picture": picture, "contour": contour, "csv": csv_file, "dxf": dxf, "boom": out_boom}
     files["report"] = document
@@ -176,8 +176,8 @@ def link(
         if file is not None:
             write(file, design)
     if document is not None:
-        from planner.document import write_document
         from planner.links.picture import link_pictures
+        from planner.reports.document import write_document
 
         write_document(document, link_report.to_markdown(design), link_pictures(design))
     if out_boom is not None:

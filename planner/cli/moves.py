@@ -22,12 +22,12 @@ from planner.cli.options import (
     vehicle_option,
 )
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
-from planner.targets import parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target
+from planner.paths.targets import parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target
 
 if TYPE_CHECKING:
     from boom_model.arrays import Array
-    from planner.report import Report
-    from planner.trajectory import Trajectory
+    from planner.motion.trajectory import Trajectory
+    from planner.reports.report import Report
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -0.5 is a number
@@ -99,10 +99,10 @@ def plan(
       boom plan transport phenotyping --via q=40,60,120,0.3,0 --pass-via --profile time-optimal --jerk-bound --rate 250
     """
     from planner.files import check_writable
+    from planner.motion.trajectory import write_csv
+    from planner.motion.vehicle import load_case
     from planner.planning import plan as plan_move
-    from planner.remedies import remedies
-    from planner.trajectory import write_csv
-    from planner.vehicle import load_case
+    from planner.suggestions import remedies
 
     boom = load_boom(boom_file, payload)
     case = None if vehicle is None else load_case(vehicle)
@@ -146,7 +146,7 @@ def plan(
 
     reach = None
     if show_reach:
-        from boom_model.reach import reach_map
+        from boom_model.kinematics.reach import reach_map
 
         reach = reach_map(boom, options["hold"], options["pitch"])
     written = {"recording": out}
@@ -155,7 +155,7 @@ def plan(
         write_csv(move.trajectory, csv_file, move.loads.tau)
         written["csv"] = csv_file
     if picture is not None:
-        from planner.drive_pictures import write_drive_picture
+        from planner.reports.drive_pictures import write_drive_picture
 
         write_drive_picture(picture, boom, move.trajectory, move.loads.tau, report)
         written["picture"] = picture
@@ -242,7 +242,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
       boom torque move.csv --out torques.csv --payload 8
     """
     from boom_model import JOINTS
-    from planner.motion_files import form_of, read_motion, write_motion
+    from planner.motion.motion_files import form_of, read_motion, write_motion
     from planner.planning import torques
 
     form = form_of(out)
@@ -295,9 +295,9 @@ def check(
       boom check move.csv --payload 8 --out checked.rrd
     """
     from planner.files import check_writable
-    from planner.motion_files import read_motion
+    from planner.motion.motion_files import read_motion
+    from planner.motion.vehicle import load_case
     from planner.planning import examine
-    from planner.vehicle import load_case
 
     check_report(document)
     check_picture(picture)
@@ -313,7 +313,7 @@ def check(
         written["recording"] = out
     _write_report(document, move.report, boom, trajectory, move.loads.tau, written)
     if picture is not None:
-        from planner.drive_pictures import write_drive_picture
+        from planner.reports.drive_pictures import write_drive_picture
 
         write_drive_picture(picture, boom, trajectory, move.loads.tau, move.report)
         written["picture"] = picture
@@ -323,9 +323,9 @@ def check(
 def _write_report(
     document: str | None, report: "Report", boom: Boom, motion: "Trajectory", tau: "Array", written: dict[str, str]
 ) -> None:
-    from planner.document import write_document
-    from planner.drive_pictures import drive_pages
-    from planner.move_pictures import move_pictures
+    from planner.reports.document import write_document
+    from planner.reports.drive_pictures import drive_pages
+    from planner.reports.move_pictures import move_pictures
 
     if document is not None:
         write_document(

@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from boom_model import Boom, InputError
-from planner.targets import HOLDS
+from planner.paths.targets import HOLDS
 
 _CATALOGUE = "boom.catalogue"
 
@@ -76,7 +76,7 @@ def check_picture(picture: str | None) -> None:
 
 def check_report(document: str | None) -> None:
     """Whether a report can have that name, before the work."""
-    from planner.document import require_form
+    from planner.reports.document import require_form
 
     if document is not None:
         require_form(document)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from planner.report import Report
+    from planner.reports.report import Report
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _PIPE_WIDTH = 132
@@ -33,8 +33,8 @@ STYLES = {
 
 def print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:
     """Prints a report as tables and sentences or as JSON; returns the exit code."""
-    from planner.checks import Verdict
-    from planner.report import CERTIFICATE_HEADER, PEAK_HEADER, cells, peak_cells, worst_cells
+    from planner.checks.motion_checks import Verdict
+    from planner.reports.report import CERTIFICATE_HEADER, PEAK_HEADER, cells, peak_cells, worst_cells
 
     if as_json:
         print_json(report.to_json(written))

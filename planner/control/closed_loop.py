@@ -11,10 +11,10 @@ from boom_model.arrays import Array, checked
 from planner.control.design import Controller, Gains, Goals, design
 from planner.control.plant import Plant, accelerations, equilibrium, friction, spring_torque, torque_limits, twist_under
 from planner.control.shaping import Impulses
+from planner.motion.vehicle import VehicleCase, base_motion
 from planner.planning import Move
-from planner.time_law import Motion
-from planner.tracking import Track
-from planner.vehicle import VehicleCase, base_motion
+from planner.progress import Track
+from planner.timing.time_law import Motion
 
 DIVERGED = 1.0
 """An error [rad, the extension's in m] at which a case counts as out of control, and is simulated no further."""

@@ -31,7 +31,7 @@ from boom_model import (
     mass_matrix,
 )
 from boom_model.arrays import Array, read_only
-from boom_model.drives import available_torque, reflected_inertia
+from boom_model.drives.drive import available_torque, reflected_inertia
 from planner.control.figures import Figures
 
 _UNITS = np.concatenate([np.zeros((1, 5)), np.eye(5)])

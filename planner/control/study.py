@@ -15,11 +15,11 @@ from planner.control.design import Controller, Goals, Loop, analyse
 from planner.control.figures import Figures
 from planner.control.plant import Plant, natural_frequencies
 from planner.control.shaping import Impulses, Shaper, impulses
-from planner.markdown import section, table
+from planner.motion.vehicle import VehicleCase
 from planner.planning import Move
-from planner.report import assumptions
-from planner.tracking import Track
-from planner.vehicle import VehicleCase
+from planner.progress import Track
+from planner.reports.markdown import section, table
+from planner.reports.report import assumptions
 
 POSES = 9
 """Poses along a move at which the loop's poles are computed."""

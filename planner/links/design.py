@@ -9,9 +9,9 @@ import numpy as np
 
 from boom_model import JOINTS, Body, Boom, InputError, inverse_dynamics, transmission_angle
 from boom_model.arrays import Array, read_only
-from boom_model.catalogue import Catalogue
-from boom_model.drives import Drive
-from boom_model.dynamics import PayloadAs
+from boom_model.drives.catalogue import Catalogue
+from boom_model.drives.drive import Drive
+from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.link_design import (
     THESIS_LOAD,
     Beam,
@@ -35,11 +35,11 @@ from boom_model.link_design.beam import Forces
 from boom_model.link_design.exact import buckling_load, pressed
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
+from planner.checks.rows import Verdict
 from planner.links.loads import largest_components, link_cases, thesis_load
+from planner.motion.trajectory import Trajectory
 from planner.planning import check, plan, plan_each_profile
-from planner.rows import Verdict
-from planner.tracking import Track
-from planner.trajectory import Trajectory
+from planner.progress import Track
 
 E = TypeVar("E", bound=StrEnum)
 

@@ -11,9 +11,9 @@ import numpy as np
 from boom_model import Boom, InputError, body_motion, inverse_dynamics, transmission_angle
 from boom_model.arrays import Array, read_only
 from boom_model.boom import LIMIT_TOLERANCE
-from boom_model.dynamics import PayloadAs
+from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.link_design import Link, LoadCases, ThesisLoad
-from planner.trajectory import Trajectory
+from planner.motion.trajectory import Trajectory
 
 _FLAT = 1e-6
 """Transmission angle [rad] below which a linkage is flat."""

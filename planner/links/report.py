@@ -8,8 +8,8 @@ import numpy as np
 from boom_model import JOINTS
 from planner.links.convergence import PLACES, Convergence
 from planner.links.design import INSIDE, LinkDesign
-from planner.markdown import section, table
-from planner.report import assumptions
+from planner.reports.markdown import section, table
+from planner.reports.report import assumptions
 
 
 def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:

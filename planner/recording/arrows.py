@@ -8,7 +8,7 @@ import rerun as rr
 
 from boom_model import Boom, Loads
 from boom_model.arrays import Array
-from boom_model.frames import frame_transforms
+from boom_model.kinematics.frames import frame_transforms
 from planner.recording.palette import LIGHT, PURPLE, Color
 from planner.recording.scene import POSES_AT_ONCE
 from planner.recording.stream import time_column

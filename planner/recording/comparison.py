@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from boom_model import JOINTS, forward_kinematics
 from boom_model.boom import IS_LENGTH
-from planner.comparison import Comparison
+from planner.experiments.comparison import Comparison
 from planner.recording.layout import eye_of, grid, scene, shown_beside, text
 from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, PAYLOAD_COLOR
 from planner.recording.plots import Bundle, for_people

@@ -1,11 +1,11 @@
 """The checks as a table, and what is assumed, as Markdown."""
 
 from boom_model import Boom
-from planner.markdown import section, table
+from planner.checks.rows import Verdict
 from planner.recording.arrows import WHAT_ARROWS_SHOW
 from planner.recording.scene import FOR_THE_EYE
-from planner.report import Report, cells
-from planner.rows import Verdict
+from planner.reports.markdown import section, table
+from planner.reports.report import Report, cells
 
 CHECK_HEADER = ("verdict", "joint", "check", "demand", "limit", "margin", "required", "at", "basis")
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from boom_model import JOINTS, Basis, Drive, tip_deflection
 from boom_model.arrays import Array
-from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque
+from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
 from planner.planning import Move
 from planner.recording.palette import (
     GREEN,

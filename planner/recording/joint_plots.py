@@ -7,7 +7,8 @@ import numpy as np
 from boom_model import JOINTS, Basis, Boom, Breakdown, Loads
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, Mount
-from boom_model.drives import drive_inertia, drive_torque_limit
+from boom_model.drives.drive import drive_inertia, drive_torque_limit
+from planner.motion.trajectory import Trajectory
 from planner.recording.palette import (
     COLORS,
     GREEN,
@@ -22,7 +23,6 @@ from planner.recording.palette import (
     YELLOW,
 )
 from planner.recording.plots import Bundle, Plot, for_people
-from planner.trajectory import Trajectory
 
 MOST_RATIO = 5.0
 """Where the curves of torque / limit are cut off: a motor too fast for any torque has no bound."""

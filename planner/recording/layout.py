@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from boom_model import Boom
 from boom_model.arrays import Array
-from boom_model.frames import frame_transforms
+from boom_model.kinematics.frames import frame_transforms
 from planner.recording.plots import Bundle, Plot
 
 

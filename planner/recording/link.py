@@ -8,7 +8,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from boom_model import JOINTS, forward_kinematics
-from boom_model.frames import R_LINK_BODY
+from boom_model.kinematics.frames import R_LINK_BODY
 from planner.links.design import LinkDesign
 from planner.links.picture import write_link_picture
 from planner.links.report import title, to_markdown

@@ -6,8 +6,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from boom_model import forward_kinematics
-from boom_model.reach import ReachMap
-from planner.drive_pictures import drive_picture
+from boom_model.kinematics.reach import ReachMap
 from planner.planning import Move
 from planner.recording import drive_plots, joint_plots
 from planner.recording.arrows import arrow_scale, log_arrows
@@ -20,6 +19,7 @@ from planner.recording.scene import ground_level, log_motion, log_mount, log_sol
 from planner.recording.stream import log_markdown, log_png, save
 from planner.recording.torque_ratio import legend, log_tip_path, torque_ratios, worst_ratio
 from planner.recording.torque_speed import log_plane, planes
+from planner.reports.drive_pictures import drive_picture
 
 
 def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = None) -> None:

@@ -7,13 +7,13 @@ import rerun as rr
 
 from boom_model import Boom
 from boom_model.arrays import Array
-from boom_model.frames import frame_transforms
-from boom_model.reach import ReachMap
-from planner.reach_picture import margin_colors, margin_range, reach_title, reference_pose
+from boom_model.kinematics.frames import frame_transforms
+from boom_model.kinematics.reach import ReachMap
 from planner.recording.layout import eye_on, scene, shown_beside, text
 from planner.recording.palette import GREY, OUTSIDE_COLOR, PAYLOAD_COLOR
 from planner.recording.scene import log_motion, log_mount, log_solids
 from planner.recording.stream import log_markdown, save
+from planner.reports.reach_picture import margin_colors, margin_range, reach_title, reference_pose
 
 
 def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> None:

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from boom_model import Boom, body_transforms
 from boom_model.arrays import Array
-from boom_model.frames import R_LINK_BODY
 from boom_model.keep_out import Box, KeepOut
+from boom_model.kinematics.frames import R_LINK_BODY
+from planner.motion.vehicle import VehicleCase, base_pose
 from planner.recording.palette import COLORS, DARK, GREY, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, PIN_COLOR, Color
 from planner.recording.stream import time_column
-from planner.vehicle import VehicleCase, base_pose
 
 POSES_AT_ONCE = 20_000
 """Samples whose poses are in memory together; each takes some 3 kB there, and 0.5 kB in the file."""

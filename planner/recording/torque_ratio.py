@@ -5,12 +5,12 @@ import rerun as rr
 
 from boom_model import JOINTS, Boom
 from boom_model.arrays import Array
-from boom_model.drives import drive_torque_limit
-from planner.constraints import load_ratio
+from boom_model.drives.drive import drive_torque_limit
+from planner.checks.rows import SAMPLING_SLACK
+from planner.motion.trajectory import Trajectory
 from planner.recording.legend import Legend
 from planner.recording.palette import BLUE, GREEN, LIGHT, ORANGE, SKY_BLUE, VERMILION, YELLOW, Color
-from planner.rows import SAMPLING_SLACK
-from planner.trajectory import Trajectory
+from planner.timing.path_limits import load_ratio
 
 BANDS: tuple[tuple[float, str, Color], ...] = (
     (0.2, "below 0.2", BLUE),

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 
 from boom_model import JOINTS, Basis, Drive
 from boom_model.arrays import Array
-from boom_model.drives import STEPPER_MARGIN, available_torque, motor_torque
+from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
 from planner.planning import Move
 from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, Color
 from planner.recording.stream import time_column

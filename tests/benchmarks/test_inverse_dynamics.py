@@ -16,7 +16,7 @@ import pytest
 
 from boom_model.arrays import Array
 from boom_model.boom import Boom
-from boom_model.dynamics import Loads, inverse_dynamics
+from boom_model.dynamics.newton_euler import Loads, inverse_dynamics
 from tests.oracles import mujoco_model, pinocchio_model, random_base, random_states, tree_matrix
 
 BOOM = Boom.load()

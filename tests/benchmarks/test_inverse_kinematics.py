@@ -14,10 +14,10 @@ from ikpy.link import DHLink, URDFLink
 
 from boom_model.arrays import Array
 from boom_model.boom import Boom
-from boom_model.frames import dh_rows
-from boom_model.holds import FixedExtension, LeastExtension, LeastTorque
-from boom_model.inverse_kinematics import solve_branches
-from boom_model.kinematics import forward_kinematics
+from boom_model.kinematics.constraints import FixedExtension, LeastExtension, LeastTorque
+from boom_model.kinematics.forward import forward_kinematics
+from boom_model.kinematics.frames import dh_rows
+from boom_model.kinematics.inverse import solve_branches
 from tests.oracles import random_states
 
 BOOM = Boom.load()

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from boom_model import Boom
 from planner import Trajectory
-from planner.motion_files import read_motion, write_motion
+from planner.motion.motion_files import read_motion, write_motion
 from planner.planning import examine
 from planner.recording import write_recording
 

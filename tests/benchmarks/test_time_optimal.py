@@ -25,7 +25,7 @@ from toppra.constraint import (
 from boom_model import Boom
 from boom_model.arrays import Array
 from planner import JointLine, Motion
-from planner.profiles.time_optimal import GRID_INTERVALS, time_optimal
+from planner.timing.profiles.time_optimal import GRID_INTERVALS, time_optimal
 from tests.benchmarks.test_inverse_dynamics import fixed_root
 from tests.minimum_time import AT_STANDSTILL, DRIVEN, INERTIA, throughout, worst_ratios
 from tests.oracles import pinocchio_model, tree_matrix

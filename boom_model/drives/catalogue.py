@@ -1,0 +1,246 @@
+"""The catalogue of motors, gearboxes and linear actuators: a TOML file in the datasheets' units, read into SI."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from boom_model.drives.drive import Gearbox, Motor, Winding
+from boom_model.drives.linear_actuator import LinearActuator
+from boom_model.errors import InputError
+from boom_model.toml_file import Finite, Table, read_toml
+
+CATALOGUE_FILE = Path(str(files("boom_model") / "data" / "catalogue.toml"))
+
+_RPM = 2.0 * np.pi / 60.0
+
+# Wide enough for any drive that is built; beyond is a slip of units.
+_Text = Annotated[str, Field(min_length=1)]
+_Ratio = Annotated[float, Field(ge=1, le=1e4, allow_inf_nan=False)]
+_Step = Annotated[float, Field(ge=0.1, le=90, allow_inf_nan=False)]
+_Angle = Annotated[float, Field(gt=0, le=90, allow_inf_nan=False)]
+_Percent = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+_Efficiency = Annotated[float, Field(ge=1, le=100, allow_inf_nan=False)]
+"""From 1 %: 0.65 is a share."""
+_Mass = Annotated[float, Field(ge=1e-3, le=1e4, allow_inf_nan=False)]
+_Torque = Annotated[float, Field(ge=1e-4, le=1e6, allow_inf_nan=False)]
+_Force = Annotated[float, Field(ge=1e-3, le=1e7, allow_inf_nan=False)]
+_Current = Annotated[float, Field(ge=1e-2, le=1e3, allow_inf_nan=False)]
+_Resistance = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
+_Inductance = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
+_Voltage = Annotated[float, Field(ge=0.1, le=1e3, allow_inf_nan=False)]
+_RotorInertia = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
+_InputInertia = Annotated[float, Field(ge=1e-9, le=1.0, allow_inf_nan=False)]
+_Stiffness = Annotated[float, Field(ge=1e-3, le=1e4, allow_inf_nan=False)]
+"""[Nm/mrad]: 1e4 is several times the largest strain-wave gearbox; a figure in Nm/rad is mostly beyond."""
+_Play = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
+_InputSpeed = Annotated[float, Field(ge=0.1, le=1e5, allow_inf_nan=False)]
+_Life = Annotated[float, Field(ge=1, le=1e7, allow_inf_nan=False)]
+_Speed = Annotated[float, Field(ge=1e-5, le=100, allow_inf_nan=False)]
+_Stroke = Annotated[float, Field(ge=1e-3, le=100, allow_inf_nan=False)]
+_Lead = Annotated[float, Field(ge=1e-2, le=1e4, allow_inf_nan=False)]
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """Motors, gearboxes and linear actuators by model name."""
+
+    motors: Mapping[str, Motor]
+    gearboxes: Mapping[str, Gearbox]
+    actuators: Mapping[str, LinearActuator]
+
+    @staticmethod
+    def load(path: str | Path | None = None) -> "Catalogue":
+        """The shipped catalogue (thesis, Appendix E), or one of the same form.
+
+        Raises:
+            InputError: the file cannot be read, or breaks the form; names the file and the key.
+        """
+        table = read_toml(Path(path) if path is not None else CATALOGUE_FILE, _CatalogueTable)
+        return Catalogue(
+            motors=MappingProxyType({name: _motor(name, t) for name, t in table.motors.items()}),
+            gearboxes=MappingProxyType({name: _gearbox(name, t) for name, t in table.gearboxes.items()}),
+            actuators=MappingProxyType({name: _actuator(name, t) for name, t in table.actuators.items()}),
+        )
+
+    def with_file(self, path: str | Path | None) -> "Catalogue":
+        """This catalogue and the entries of another file; None adds nothing.
+
+        Raises:
+            InputError: as `load`, or an entry of the file bears a name that is taken; names the file and the entry.
+        """
+        if path is None:
+            return self
+        own = Catalogue.load(path)
+        for field in fields(self):
+            for name in getattr(own, field.name):
+                if name in getattr(self, field.name):
+                    raise InputError(f"{path}: key {field.name}.{name}: the name is taken by an entry that is known already")
+        return Catalogue(**{f.name: MappingProxyType({**getattr(self, f.name), **getattr(own, f.name)}) for f in fields(self)})
+
+
+class _WindingTable(Table):
+    current_A: _Current
+    resistance_ohm: _Resistance
+    inductance_mH: _Inductance
+    voltage_V: _Voltage | None = None
+
+
+class _MotorTable(Table):
+    """What no check uses (phase voltage, temperatures, shaft loads) stands in the file for its readers."""
+
+    source: _Text
+    tolerance_percent: _Percent | None = None
+    step_deg: _Step
+    full_step_accuracy_deg: _Angle | None = None
+    microstep_accuracy_deg: _Angle | None = None
+    max_voltage_V: _Voltage | None = None
+    holding_torque_Nm: _Torque | None = None
+    running_torque_Nm: _Torque | None = None
+    mass_kg: _Mass | None = None
+    rotor_inertia_kg_cm2: _RotorInertia | None = None
+    ambient_degC: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
+    max_operating_degC: Finite | None = None
+    max_radial_load_kg: _Mass | None = None
+    max_thrust_load_kg: _Mass | None = None
+    parallel: _WindingTable | None = None
+    series: _WindingTable | None = None
+
+
+_RATINGS = ("max_average_torque_Nm", "start_stop_torque_Nm", "peak_torque_Nm")
+"""Of a gearbox, none less than the one before."""
+
+
+class _GearboxTable(Table):
+    source: _Text
+    ratio: _Ratio
+    continuous_torque_Nm: _Torque | None = None
+    start_stop_torque_Nm: _Torque | None = None
+    max_average_torque_Nm: _Torque | None = None
+    peak_torque_Nm: _Torque | None = None
+    efficiency_percent: _Efficiency | None = None
+    no_load_input_torque_Nm: _Torque | None = None
+    starting_torque_Nm: _Torque | None = None
+    backdrive_torque_Nm: _Torque | None = None
+    mass_kg: _Mass | None = None
+    input_inertia_kg_m2: _InputInertia | None = None
+    torsion_T1_Nm: _Torque | None = None
+    torsion_T2_Nm: _Torque | None = None
+    torsion_K1_Nm_per_mrad: _Stiffness | None = None
+    torsion_K2_Nm_per_mrad: _Stiffness | None = None
+    torsion_K3_Nm_per_mrad: _Stiffness | None = None
+    backlash_mrad: _Play | None = None
+    hysteresis_mrad: _Play | None = None
+    max_input_speed_rpm: _InputSpeed | None = None
+    max_average_input_speed_rpm: _InputSpeed | None = None
+    rated_life_h: _Life | None = None
+    rated_input_speed_rpm: _InputSpeed | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "_GearboxTable":
+        given = [name for name in _RATINGS if getattr(self, name) is not None]
+        for low, high in pairwise(given):
+            if getattr(self, low) > getattr(self, high):
+                raise ValueError(f"{high} is {getattr(self, high):g}, less than {low}, which is {getattr(self, low):g}")
+        T1, T2 = self.torsion_T1_Nm, self.torsion_T2_Nm
+        if T1 is not None and T2 is not None and T1 >= T2:
+            raise ValueError(f"torsion_T1_Nm is {T1:g}; it must be below torsion_T2_Nm, which is {T2:g}")
+        return self
+
+
+class _ActuatorTable(Table):
+    source: _Text
+    rated_force_N: _Force | None = None
+    peak_force_N: _Force | None = None
+    static_force_N: _Force | None = None
+    max_speed_m_s: _Speed | None = None
+    stroke_m: _Stroke | None = None
+    lead_mm: _Lead | None = None
+    efficiency_percent: _Efficiency | None = None
+    backdrive_force_N: _Force | None = None
+    duty_percent: _Percent | None = None
+    mass_kg: _Mass | None = None
+
+
+class _CatalogueTable(Table):
+    motors: dict[str, _MotorTable] = Field(default_factory=dict)
+    gearboxes: dict[str, _GearboxTable] = Field(default_factory=dict)
+    actuators: dict[str, _ActuatorTable] = Field(default_factory=dict)
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor
+
+
+def _winding(table: _WindingTable | None) -> Winding | None:
+    if table is None:
+        return None
+    return Winding(table.current_A, table.resistance_ohm, table.inductance_mH * 1e-3)
+
+
+def _motor(name: str, t: _MotorTable) -> Motor:
+    return Motor(
+        name=name,
+        source=t.source,
+        step=float(np.radians(t.step_deg)),
+        max_voltage=t.max_voltage_V,
+        holding_torque=t.holding_torque_Nm,
+        running_torque=t.running_torque_Nm,
+        mass=t.mass_kg,
+        rotor_inertia=_scaled(t.rotor_inertia_kg_cm2, 1e-4),
+        parallel=_winding(t.parallel),
+        series=_winding(t.series),
+        microstep_accuracy=_scaled(t.microstep_accuracy_deg, np.pi / 180.0),
+        tolerance=_scaled(t.tolerance_percent, 0.01),
+    )
+
+
+def _gearbox(name: str, t: _GearboxTable) -> Gearbox:
+    torques = (t.torsion_T1_Nm, t.torsion_T2_Nm)
+    stiffness = tuple(_scaled(k, 1e3) for k in (t.torsion_K1_Nm_per_mrad, t.torsion_K2_Nm_per_mrad, t.torsion_K3_Nm_per_mrad))
+    return Gearbox(
+        name=name,
+        source=t.source,
+        ratio=t.ratio,
+        continuous_torque=t.continuous_torque_Nm,
+        start_stop_torque=t.start_stop_torque_Nm,
+        max_average_torque=t.max_average_torque_Nm,
+        peak_torque=t.peak_torque_Nm,
+        efficiency=_scaled(t.efficiency_percent, 0.01),
+        no_load_input_torque=t.no_load_input_torque_Nm,
+        starting_torque=t.starting_torque_Nm,
+        backdrive_torque=t.backdrive_torque_Nm,
+        mass=t.mass_kg,
+        input_inertia=t.input_inertia_kg_m2,
+        torsion_torques=None if None in torques else torques,  # type: ignore[arg-type]
+        torsion_stiffness=None if None in stiffness else stiffness,  # type: ignore[arg-type]
+        backlash=_scaled(t.backlash_mrad, 1e-3),
+        hysteresis=_scaled(t.hysteresis_mrad, 1e-3),
+        max_input_speed=_scaled(t.max_input_speed_rpm, _RPM),
+        max_average_input_speed=_scaled(t.max_average_input_speed_rpm, _RPM),
+        rated_life=_scaled(t.rated_life_h, 3600.0),
+        rated_input_speed=_scaled(t.rated_input_speed_rpm, _RPM),
+    )
+
+
+def _actuator(name: str, t: _ActuatorTable) -> LinearActuator:
+    return LinearActuator(
+        name=name,
+        source=t.source,
+        rated_force=t.rated_force_N,
+        peak_force=t.peak_force_N,
+        static_force=t.static_force_N,
+        max_speed=t.max_speed_m_s,
+        stroke=t.stroke_m,
+        lead=_scaled(t.lead_mm, 1e-3),
+        efficiency=_scaled(t.efficiency_percent, 0.01),
+        backdrive_force=t.backdrive_force_N,
+        duty=_scaled(t.duty_percent, 0.01),
+        mass=t.mass_kg,
+    )

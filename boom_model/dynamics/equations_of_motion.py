@@ -1,0 +1,102 @@
+"""The structure of the dynamics: M(q) qdd + C(q, qd) qd + g(q) = tau, and what follows from it.
+
+Every term is `inverse_dynamics` at a state that leaves only that term; there is no second model.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, broadcast, checked
+from boom_model.boom import Boom
+from boom_model.drives.drive import reflected_inertia
+from boom_model.dynamics.base_motion import BaseMotion
+from boom_model.dynamics.newton_euler import inverse_dynamics
+from boom_model.kinematics.forward import body_motion
+
+_ACCELERATIONS = np.eye(5)
+
+
+def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Array:
+    """M(q) (..., 5, 5): torque per joint acceleration, payload as mass; with the drives' reflected inertia where asked.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    q = checked("q", q, 5)[..., None, :]
+    M = inverse_dynamics(boom, q, np.zeros(5), _ACCELERATIONS, base=_falling(boom), reactions=False).tau
+    if drive_inertia:
+        M = M + np.diag([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives])
+    return (M + np.swapaxes(M, -1, -2)) / 2.0  # symmetric to the last bit
+
+
+def velocity_torque(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
+    """C(q, qd) qd (..., 5): Coriolis and centrifugal torque.
+
+    Raises:
+        InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
+    """
+    return inverse_dynamics(boom, q, qd, np.zeros(5), base=_falling(boom), reactions=False).tau
+
+
+def gravity_torque(boom: Boom, q: ArrayLike, *, base: BaseMotion | None = None) -> Array:
+    """g(q) (..., 5): torque that holds the joints still, against gravity and whatever `base` does besides.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    return inverse_dynamics(boom, q, np.zeros(5), np.zeros(5), base=base, reactions=False).tau
+
+
+def forward_dynamics(
+    boom: Boom,
+    q: ArrayLike,
+    qd: ArrayLike,
+    tau: ArrayLike,
+    *,
+    base: BaseMotion | None = None,
+    friction: bool = False,
+    drive_inertia: bool = False,
+) -> Array:
+    """Joint accelerations (..., 5) under joint torques: qdd = M^-1 (tau - inverse_dynamics(q, qd, 0)).
+
+    Args:
+        q, qd, tau: (..., 5); they broadcast.
+        base, friction, drive_inertia: as in `inverse_dynamics`. Coulomb friction is 0 at rest: it brakes, and does not stick.
+
+    Raises:
+        InputError: an input is not finite or of the wrong shape, or shapes do not match.
+    """
+    q, qd, tau = broadcast(q=q, qd=qd, tau=tau)
+    bias = inverse_dynamics(boom, q, qd, np.zeros(5), base=base, friction=friction, reactions=False).tau
+    M = mass_matrix(boom, q, drive_inertia=drive_inertia)
+    return np.asarray(np.linalg.solve(M, (tau - bias)[..., None])[..., 0])
+
+
+def kinetic_energy(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
+    """(1/2) qd . M(q) qd (...) [J], on a base at rest.
+
+    Raises:
+        InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
+    """
+    q, qd = broadcast(q=q, qd=qd)
+    momentum = (mass_matrix(boom, q) @ qd[..., None])[..., 0]
+    energy: Array = 0.5 * np.sum(qd * momentum, axis=-1)
+    return energy
+
+
+def potential_energy(boom: Boom, q: ArrayLike) -> Array:
+    """sum m g z over bodies and payload (...) [J], z above frame 1 on level ground.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    q = checked("q", q, 5)
+    zero = np.zeros(5)
+    masses = {**boom.bodies, "payload": boom.payload}
+    heights = {name: motion.com[..., 2] for name, motion in body_motion(boom, q, zero, zero).items()}
+    return boom.gravity * np.asarray(sum(masses[name].mass * z for name, z in heights.items()))
+
+
+def _falling(boom: Boom) -> BaseMotion:
+    """A base in free fall, where gravity is not felt."""
+    return BaseMotion.of(acceleration=(0.0, 0.0, -boom.gravity))

@@ -1,0 +1,386 @@
+"""Newton-Euler over the closed linkage with regrouped inertial parameters: joint torques, pin forces, mount wrench.
+
+Every body is followed in the arm's plane, which yaws with theta1: axes x forward, z up and n = x cross z, the plane's normal
+(to the boom's right), origin in frame 1. A link at angle a has its own axes e = (cos a, sin a, 0), p = (-sin a, cos a, 0)
+and n. Any mass element then stands at c = sum_i g_i b_i, with constants g_i and the eleven vectors
+
+    b = o, x, z, n, e2, p2, e3, p3, rho e3, et, pt      (o the origin itself; 2, 3, t: theta2, theta3, theta3 + theta5)
+
+and its acceleration less gravity is sum_i g_i A_i. With the plane's angular velocity W and the base's acceleration a0,
+
+    A_o = a0 - gravity,   A_i = W' x b + W x (W x b) + 2 W x b' + b''      (thesis, eqs. 2.41, 2.42 and 2.44 as corrected).
+
+Newton's and Euler's equations of a set of bodies ask no more of its masses than the constant Q = int g g^T dm: with
+U = Q A, the force on the set is U_o, and its moment about any pin a sum of b_i x U_i. The equilibrium of tool, extension,
+upper, outer, inner and lower link gives the joint torques and the pin forces from these (eqs. 2.45-2.71).
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, broadcast, checked, read_only
+from boom_model.boom import Body, Boom
+from boom_model.drives.drive import reflected_inertia
+from boom_model.dynamics.base_motion import BaseMotion
+from boom_model.errors import InputError
+from boom_model.kinematics.frames import R_LINK_BODY
+
+PayloadAs = Literal["mass", "force"]
+
+_CHUNK = 1280
+"""Samples at once. The working arrays of a chunk stay in the processor's cache, and OpenBLAS takes its products on one thread:
+a second one gains nothing on so thin a matrix, and waits for its turn on a busy machine."""
+
+_O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
+_BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
+_LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
+
+
+@dataclass(frozen=True, eq=False)
+class PinForces:
+    """Forces at the linkage's pins [N], each (..., 3) in frame 4: x forward, y to the left, z up, yawing with theta1.
+
+    They lie in the arm's plane: how pins 7 and 8 share the load across it is statically indeterminate, so y is 0. They grow
+    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right: see `transmission_angle`.
+    """
+
+    frame_6: Array
+    """of the lower link on the outer link"""
+    frame_7: Array
+    """of the outer link on the upper link"""
+    frame_8: Array
+    """of the inner link on the upper link"""
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """What a motion asks of the boom."""
+
+    tau: Array
+    """(..., 5) joint torques [Nm], the extension's force [N], positive along the joint coordinate."""
+    pins: PinForces | None
+    """None where reactions were not asked for."""
+    mount: Array | None
+    """(..., 6) force [N] and moment [Nm] of the boom on the vehicle's mount, in and about frame 1; None likewise."""
+
+
+def inverse_dynamics(
+    boom: Boom,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    *,
+    base: BaseMotion | None = None,
+    payload_as: PayloadAs = "mass",
+    tip_force: ArrayLike | None = None,
+    tip_moment: ArrayLike | None = None,
+    friction: bool = False,
+    drive_inertia: bool = False,
+    reactions: bool = True,
+) -> Loads:
+    """Joint torques, pin forces and mount wrench for a motion, by Newton-Euler (thesis, eqs. 2.45-2.71 as corrected).
+
+    Args:
+        q, qd, qdd: (..., 5) joint positions, velocities, accelerations [rad, the extension in m]; they broadcast.
+        base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level ground.
+        payload_as: "mass" moves the payload with the tip; "force" hangs its weight there and leaves its inertia out, as the
+            thesis does.
+        tip_force, tip_moment: (..., 3) force [N] and moment [Nm] that the surroundings put on the tip, along frame 1.
+        friction: whether tau overcomes the joints' friction, viscous qd + coulomb sign(qd).
+        drive_inertia: whether tau accelerates the drives' reflected inertia N^2 (J_rotor + J_gear) too, where it is known.
+            Friction and drive inertia are added to tau alone; their reaction on the pins and the mount is left out.
+        reactions: whether to compute pin forces and mount wrench.
+
+    Raises:
+        InputError: an input is not finite or of the wrong shape, or shapes do not match.
+
+    >>> boom = Boom.load()
+    >>> loads = inverse_dynamics(boom, boom.pose("phenotyping"), np.zeros(5), np.zeros(5))
+    >>> [round(float(x), 1) + 0.0 for x in loads.tau]
+    [0.0, 110.2, 200.3, 0.0, 0.0]
+    """
+    if payload_as not in ("mass", "force"):
+        raise InputError(f"payload_as is {payload_as!r}; it must be 'mass' or 'force'")
+    positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
+    shape = positions.shape[:-1]
+    motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]
+    outside = [] if base is None else [_vectors(f"base {name}", getattr(base, name), shape) for name in _BASE_ENTRIES]
+    push = None if tip_force is None else _vectors("tip_force", tip_force, shape)
+    twist = None if tip_moment is None else _vectors("tip_moment", tip_moment, shape)
+    count = len(motion[0])
+    out = _Outputs(
+        np.empty((count, 5)),
+        np.zeros((3, count, 3)) if reactions else None,
+        np.empty((count, 6)) if reactions else None,
+    )
+    model = _model(boom, payload_as)
+    rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives])
+    for start in range(0, count, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        state = _State(*(np.ascontiguousarray(x[part].T) for x in motion))
+        plane = _plane(boom, state, *(x[part].T for x in outside))
+        applied = _Applied(*(None if x is None else _into_plane(state, x[part].T) for x in (push, twist)))
+        _newton_euler(model, state, plane, applied, out.part(part))
+        if friction:
+            out.tau[part] += boom.friction.viscous * motion[1][part] + boom.friction.coulomb * np.sign(motion[1][part])
+        if drive_inertia:
+            out.tau[part] += rotors * motion[2][part]
+    return Loads(
+        tau=out.tau.reshape(*shape, 5),
+        pins=None if out.pins is None else PinForces(*(p.reshape(*shape, 3) for p in out.pins)),
+        mount=None if out.mount is None else out.mount.reshape(*shape, 6),
+    )
+
+
+def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
+    """Force (..., 3) [N] that the inner link carries at its upper pin, in frame 5 of the inner loop: x along the link.
+
+    Chapter 3's f_B: the reaction to the inner link's force on the upper link at frame 8.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    theta2 = checked("q", q, 5)[..., 1]
+    c, s = np.cos(theta2), np.sin(theta2)
+    x, z = pins.frame_8[..., 0], pins.frame_8[..., 2]
+    return np.stack([-(c * x + s * z), s * x - c * z, np.zeros_like(x)], axis=-1)
+
+
+class _Model(NamedTuple):
+    """The boom's masses, regrouped."""
+
+    boom: Boom
+    rows: Array
+    """(17, 11): Q of all bodies; then Q of the outer link (o, e2, p2) and of all beyond pins 7 and 8 (o, e3, p3)."""
+    tip: Array
+    """(11,) g of the tip."""
+    payload: Array
+    """(11,) g of the payload's centre of mass."""
+    hanging: float
+    """Payload that is a force [kg]."""
+
+
+@lru_cache(maxsize=16)
+def _model(boom: Boom, payload_as: PayloadAs) -> _Model:
+    elements = _elements(boom)
+    bodies = {**boom.bodies, "payload": boom.payload}
+    Q = {name: elements[name].T @ _pseudo_inertia(body, R_LINK_BODY[name]) @ elements[name] for name, body in bodies.items()}
+    if payload_as == "force":
+        Q["payload"] = np.zeros((11, 11))
+    top = sum((Q[name] for name in ("upper", "extension", "end_effector", "payload")), np.zeros((11, 11)))
+    rows = [sum(Q.values(), np.zeros((11, 11))), Q["outer"][[_O, _E2, _P2]], top[[_O, _E3, _P3]]]
+    com = R_LINK_BODY["payload"] @ boom.payload.com
+    return _Model(
+        boom=boom,
+        rows=read_only(np.concatenate(rows)),
+        tip=elements["payload"][0],
+        payload=elements["payload"].T @ [1.0, *com],
+        hanging=boom.payload.mass if payload_as == "force" else 0.0,
+    )
+
+
+def _elements(boom: Boom) -> dict[str, Array]:
+    """g of each body's frame origin, and what a metre along its link's e, p and n adds: (4, 11) a body."""
+    g, unit = boom.geometry, np.eye(11)
+    shoulder = unit[_O] + g.L2 * unit[_X] + g.L1 * unit[_Z]
+    pin6 = shoulder + g.L3 * unit[_E3]
+    pin8 = shoulder + g.L9 * unit[_E2]
+    wrist = pin8 - g.L6 * unit[_P3] - unit[_RHO]
+    placed = {
+        "base": (unit[_O], _X, _Z),
+        "lower": (shoulder, _E3, _P3),
+        "inner": (shoulder, _E2, _P2),
+        "outer": (pin6, _E2, _P2),
+        "upper": (pin8, _E3, _P3),
+        "extension": (wrist, _E3, _P3),
+        "end_effector": (wrist, _ET, _PT),
+        "payload": (wrist + g.L8 * unit[_PT], _ET, _PT),
+    }
+    return {name: np.stack([origin, unit[e], unit[p], unit[_N]]) for name, (origin, e, p) in placed.items()}
+
+
+def _pseudo_inertia(body: Body, R: Array) -> Array:
+    """int (1, r) (1, r)^T dm over a body, r along its link's axes: (4, 4)."""
+    com, inertia = R @ body.com, R @ body.inertia @ R.T
+    moments = np.empty((4, 4))
+    moments[0, 0] = body.mass
+    moments[0, 1:] = moments[1:, 0] = body.mass * com
+    moments[1:, 1:] = 0.5 * np.trace(inertia) * np.eye(3) - inertia + body.mass * np.outer(com, com)
+    return moments
+
+
+class _State(NamedTuple):
+    """A chunk of states, each (5, n)."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+class _Plane(NamedTuple):
+    """How the arm's plane moves, along its axes x, z and n; three entries (n,) or 0 each."""
+
+    lift: tuple[Array | float, Array | float, Array | float]
+    """minus gravity"""
+    a: tuple[Array | float, Array | float, Array | float]
+    """a0 minus gravity"""
+    W: tuple[Array | float, Array, Array | float]
+    W1: tuple[Array | float, Array, Array | float]
+
+
+class _Applied(NamedTuple):
+    """Force and moment on the tip along the plane's axes, (3, n) each."""
+
+    force: Array | None
+    moment: Array | None
+
+
+class _Outputs(NamedTuple):
+    tau: Array
+    pins: Array | None
+    """(3, n, 3)"""
+    mount: Array | None
+
+    def part(self, samples: slice) -> "_Outputs":
+        return _Outputs(
+            self.tau[samples],
+            None if self.pins is None else self.pins[:, samples],
+            None if self.mount is None else self.mount[samples],
+        )
+
+
+def _vectors(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    values = checked(name, values, 3)
+    try:
+        return np.reshape(np.broadcast_to(values, (*shape, 3)), (-1, 3))
+    except ValueError:
+        raise InputError(f"{name} has shape {values.shape}; it does not match states of shape {(*shape, 5)}") from None
+
+
+def _into_plane(state: _State, vector: Array) -> Array:
+    """(3, n) along frame 1 to x, z and n of the plane."""
+    c, s = _cosine_and_sine(state.q[0])
+    return np.stack([c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]])
+
+
+def _plane(boom: Boom, state: _State, *base: Array) -> _Plane:
+    rate, accel = state.qd[0], state.qdd[0]
+    if not base:
+        level = (0.0, boom.gravity, 0.0)
+        return _Plane(level, level, (0.0, rate, 0.0), (0.0, accel, 0.0))
+    angular_velocity, angular_acceleration, acceleration, up = (_into_plane(state, x) for x in base)
+    w1, w2, w3 = angular_velocity
+    d1, d2, d3 = angular_acceleration
+    lift = boom.gravity * up
+    a = acceleration + lift
+    # The yaw axis is the plane's z: W' = base's + theta1'' z + W_base x theta1' z (thesis, eq. 2.40).
+    return _Plane(
+        (lift[0], lift[1], lift[2]), (a[0], a[1], a[2]), (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1)
+    )
+
+
+def _accelerations(state: _State, plane: _Plane, C: Array, S: Array, rho: Array) -> Array:
+    """A, the acceleration of each vector b: (3, 11, n) along x, z and n. C, S (3, n): cosine and sine of theta2, 3, t."""
+    A = np.empty((3, 11, C.shape[1]))
+    w1, w2, w3 = plane.W
+    d1, d2, d3 = plane.W1
+    w11, w22, w33, w12, w13, w23 = w1 * w1, w2 * w2, w3 * w3, w1 * w2, w1 * w3, w2 * w3
+    A[0, _O], A[1, _O], A[2, _O] = plane.a
+    A[0, _X], A[1, _X], A[2, _X] = -(w22 + w33), w12 + d3, w13 - d2
+    A[0, _Z], A[1, _Z], A[2, _Z] = w12 - d3, -(w11 + w33), w23 + d1
+    A[0, _N], A[1, _N], A[2, _N] = w13 + d2, w23 - d1, -(w11 + w22)
+    qd, qdd = state.qd, state.qdd
+    rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
+    for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
+        total, double = rate + w3, 2.0 * rate
+        square = total * total
+        along_x, along_z = square + w22, square + w11
+        less, more = accel + d3 - w12, accel + d3 + w12
+        k, m = double * w1 + w13 - d2, double * w2 + w23 + d1
+        A[0, e] = -along_x * c - less * s
+        A[1, e] = more * c - along_z * s
+        A[2, e] = k * c + m * s
+        A[0, p] = along_x * s - less * c
+        A[1, p] = -more * s - along_z * c
+        A[2, p] = m * c - k * s
+    c, s, slide = C[1], S[1], 2.0 * qd[3]
+    turning = slide * (qd[2] + w3)
+    A[:, _RHO] = rho * A[:, _E3]
+    A[0, _RHO] += qdd[3] * c - turning * s
+    A[1, _RHO] += qdd[3] * s + turning * c
+    A[2, _RHO] += slide * (w1 * s - w2 * c)
+    return A
+
+
+def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied, out: _Outputs) -> None:
+    """Fills the outputs of a chunk."""
+    g, q = model.boom.geometry, state.q
+    rho = g.L7 + q[3]
+    C, S = _cosine_and_sine(np.stack([q[1], q[2], q[2] + q[4]]))
+    A = _accelerations(state, plane, C, S, rho)
+    rows = model.rows if out.pins is not None else model.rows[:11]
+    U = rows @ A
+    if model.hanging:
+        weight = [np.broadcast_to(-model.hanging * np.asarray(x), rho.shape) for x in plane.lift]
+        _put_on(U, model.payload, np.stack(weight))
+    if applied.force is not None:
+        _put_on(U, model.tip, applied.force)
+    moment = np.zeros((3, 1)) if applied.moment is None else applied.moment
+    (c2, c3, ct), (s2, s3, st) = C, S
+
+    def about(c: Array, s: Array, e: Array, p: Array) -> Array:
+        """(b_e x U_e + b_p x U_p) . n"""
+        turned: Array = c * (e[1] - p[0]) - s * (e[0] + p[1])
+        return turned
+
+    on_tool = about(ct, st, U[:, _ET], U[:, _PT]) - moment[2]
+    beyond_actuator = rho * (c3 * U[1, _RHO] - s3 * U[0, _RHO]) + on_tool
+    # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
+    reach = ((c2, _E2, -s2, _P2), (c3, _E3, -s3, _P3), (rho * c3, _RHO, 0.0, _O), (ct, _ET, -st, _PT))
+    out.tau[:, 0] = U[0, _N] - U[2, _X] - sum(a * U[2, i] + b * U[2, j] for a, i, b, j in reach) - moment[1]
+    out.tau[:, 1] = about(c2, s2, U[:, _E2], U[:, _P2])
+    out.tau[:, 2] = about(c3, s3, U[:, _E3], U[:, _P3]) + beyond_actuator
+    out.tau[:, 3] = c3 * U[0, _RHO] + s3 * U[1, _RHO]
+    out.tau[:, 4] = on_tool
+    if out.pins is None or out.mount is None:
+        return
+
+    # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from pin 6: the moments about
+    # pins 8 and 6 give the force at pin 7 across both directions, and the balance of forces the other two.
+    F_outer, F_top = U[:, 11], U[:, 14]
+    M_outer = about(c2, s2, U[:, 12], U[:, 13])
+    M_top = about(c3, s3, U[:, 15], U[:, 16]) + beyond_actuator
+    sine = s3 * c2 - c3 * s2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along_inner, along_lower = -M_top / (g.L5 * sine), -M_outer / (g.L4 * sine)
+        f7 = along_inner * np.stack([c2, s2]) + along_lower * np.stack([c3, s3])
+    for pin, force in enumerate((F_outer[:2] + f7, f7, F_top[:2] - f7)):
+        out.pins[pin, :, 0], out.pins[pin, :, 2] = force
+
+    rise = ((s2, _E2, c2, _P2), (s3, _E3, c3, _P3), (rho * s3, _RHO, 0.0, _O), (st, _ET, ct, _PT))
+    Mx = U[2, _Z] - U[1, _N] + sum(a * U[2, i] + b * U[2, j] for a, i, b, j in rise) - moment[0]
+    Mn = U[1, _X] - U[0, _Z] + out.tau[:, 1] + out.tau[:, 2]
+    c1, s1 = _cosine_and_sine(q[0])
+    for row, (along, normal) in ((0, (U[0, _O], U[2, _O])), (3, (Mx, Mn))):
+        out.mount[:, row] = -(c1 * along + s1 * normal)
+        out.mount[:, row + 1] = -(s1 * along - c1 * normal)
+    out.mount[:, 2] = -U[1, _O]
+    out.mount[:, 5] = -out.tau[:, 0]
+
+
+def _cosine_and_sine(angle: Array) -> tuple[Array, Array]:
+    """By the tangent of half the angle, to 3e-16: NumPy's tangent is vectorised for doubles, its cosine and sine are not."""
+    t = np.tan(0.5 * angle)
+    u = 2.0 / (1.0 + t * t)
+    return u - 1.0, u * t
+
+
+def _put_on(U: Array, g: Array, force: Array) -> None:
+    """Takes a force (3, n) at the point g off what the bodies need, in place."""
+    U[:, :11] -= g[:, None] * force[:, None]
+    if U.shape[1] > 11:
+        U[:, 14:] -= g[[_O, _E3, _P3], None] * force[:, None]

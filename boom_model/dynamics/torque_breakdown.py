@@ -1,0 +1,69 @@
+"""Where a joint's torque comes from."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, broadcast
+from boom_model.boom import Boom
+from boom_model.dynamics.base_motion import BaseMotion
+from boom_model.dynamics.equations_of_motion import gravity_torque, velocity_torque
+from boom_model.dynamics.newton_euler import PayloadAs, inverse_dynamics
+
+
+@dataclass(frozen=True, eq=False)
+class Breakdown:
+    """Parts of the joint torques, each (..., 5) [Nm, the extension's N]; their sum is `inverse_dynamics`'s tau."""
+
+    gravity: Array
+    """to hold the bodies up, without payload"""
+    inertia: Array
+    """to accelerate the bodies at rest"""
+    velocity: Array
+    """Coriolis and centrifugal torque of the bodies"""
+    payload: Array
+    """all that the payload adds"""
+    friction: Array
+    vehicle: Array
+    """all that tilt and motion of the base add, with the payload"""
+
+    @property
+    def total(self) -> Array:
+        """The sum of the parts."""
+        total: Array = np.sum([getattr(self, field.name) for field in fields(self)], axis=0)
+        return total
+
+
+def breakdown(
+    boom: Boom,
+    q: ArrayLike,
+    qd: ArrayLike,
+    qdd: ArrayLike,
+    *,
+    base: BaseMotion | None = None,
+    payload_as: PayloadAs = "mass",
+    friction: bool = False,
+) -> Breakdown:
+    """Each joint's torque in parts that add up to `inverse_dynamics` with the same arguments.
+
+    Raises:
+        InputError: as `inverse_dynamics`.
+    """
+    q, qd, qdd = broadcast(q=q, qd=qd, qdd=qdd)
+    empty = boom.with_payload(0.0)
+
+    def tau(of: Boom, on: BaseMotion | None) -> Array:
+        return inverse_dynamics(of, q, qd, qdd, base=on, payload_as=payload_as, reactions=False).tau
+
+    gravity, velocity = gravity_torque(empty, q), velocity_torque(empty, q, qd)
+    bare, still = tau(empty, None), tau(boom, None)
+    zero = np.zeros_like(bare)
+    return Breakdown(
+        gravity=gravity,
+        inertia=bare - gravity - velocity,
+        velocity=velocity,
+        payload=still - bare,
+        friction=boom.friction.viscous * qd + boom.friction.coulomb * np.sign(qd) if friction else zero,
+        vehicle=zero if base is None else tau(boom, base) - still,
+    )

@@ -1,0 +1,166 @@
+"""Holds: the extra constraint that makes the inverse kinematics determinate.
+
+A position and a pitch fix four of the five joints. A constraint hold fixes the fifth; a choice hold picks, among all joint
+positions within the limits that reach the target, the one with the least cost.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, checked, read_only
+from boom_model.boom import Boom
+from boom_model.drives.drive import drive_torque_limit
+from boom_model.dynamics.equations_of_motion import gravity_torque
+from boom_model.errors import InputError
+
+
+@dataclass(frozen=True)
+class ActuatorAngle:
+    """The actuator is held at an elevation above the boom's forward horizontal: theta3 = pi + elevation."""
+
+    elevation: float
+    """[rad]; negative points down."""
+
+    def __str__(self) -> str:
+        return f"actuator={np.degrees(self.elevation):.6g} deg"
+
+
+@dataclass(frozen=True)
+class ActuatorHorizontal(ActuatorAngle):
+    """The actuator is held horizontal, pointing away from the base: theta3 = pi."""
+
+    elevation: float = 0.0
+
+    def __str__(self) -> str:
+        return "horizontal"
+
+
+@dataclass(frozen=True)
+class FixedExtension:
+    """The actuator's extension is held: theta4 = extension."""
+
+    extension: float
+    """[m]"""
+
+    def __str__(self) -> str:
+        return f"extension={self.extension:.6g} m"
+
+
+@dataclass(frozen=True)
+class LeastExtension:
+    """The actuator is extended as little as possible. Cost: theta4 [m]."""
+
+    def __str__(self) -> str:
+        return "least-extension"
+
+    def cost(self, boom: Boom, q: Array) -> Array:
+        """(...) of q (..., 5)."""
+        return q[..., 3]
+
+
+@dataclass(frozen=True)
+class NearestHorizontal:
+    """The actuator is as parallel to the ground as possible. Cost: |theta3 - pi| [rad]; less extension breaks a tie."""
+
+    def __str__(self) -> str:
+        return "nearest-horizontal"
+
+    def cost(self, boom: Boom, q: Array) -> Array:
+        """(...) of q (..., 5)."""
+        return np.abs(q[..., 2] - np.pi) + _TIE * q[..., 3]
+
+
+@dataclass(frozen=True)
+class LeastTorque:
+    """The hardest-worked drive holds as little as possible, payload included.
+
+    Cost: the largest |static torque| / (what the drive allows at rest) over the joints that have a drive. Joints without one
+    do not count, because nobody knows what they bear.
+    """
+
+    def __str__(self) -> str:
+        return "least-torque"
+
+    def cost(self, boom: Boom, q: Array) -> Array:
+        """(...) of q (..., 5).
+
+        Raises:
+            InputError: no joint has a drive with a torque limit.
+        """
+        limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
+        driven = [i for i, limit in enumerate(limits) if limit is not None]
+        if not driven:
+            raise InputError(f"hold {self}: no joint of {boom.name} has a drive to measure torques by")
+        allowed = np.array([float(limit) for limit in limits if limit is not None])
+        ratio: Array = np.max(np.abs(gravity_torque(boom, q)[..., driven]) / allowed, axis=-1)
+        return ratio
+
+
+@dataclass(frozen=True, eq=False)
+class NearestPose:
+    """Nearest to a joint position. Cost: sum of squares of the joints' distances, each as a share of its range."""
+
+    pose: Array
+    """(5,)"""
+
+    @staticmethod
+    def to(q: ArrayLike) -> "NearestPose":
+        """The hold of a joint position q (5,).
+
+        Raises:
+            InputError: not finite, or not (5,).
+        """
+        pose = checked("reference", q, 5)
+        if pose.shape != (5,):
+            raise InputError(f"reference has shape {pose.shape}; it must be (5,)")
+        return NearestPose(read_only(pose))
+
+    def __str__(self) -> str:
+        return f"nearest={','.join(f'{x:.6g}' for x in self.pose)} (rad, m)"
+
+    def cost(self, boom: Boom, q: Array) -> Array:
+        """(...) of q (..., 5)."""
+        distance: Array = np.sum(((q - self.pose) / _spans(boom)) ** 2, axis=-1)
+        return distance
+
+
+@dataclass(frozen=True)
+class LargestMargin:
+    """Farthest from the nearest joint limit. Cost: minus the least distance to a limit, each as a share of its joint's range.
+
+    The coupled limit counts with the range of theta3. Joints that target and pitch fix count too: they bound what can be had.
+    """
+
+    def __str__(self) -> str:
+        return "largest-margin"
+
+    def cost(self, boom: Boom, q: Array) -> Array:
+        """(...) of q (..., 5)."""
+        spans = _spans(boom)
+        excess: Array = np.max(boom.limits.excess(q) / np.array([*spans, spans[2]]), axis=-1)
+        return excess
+
+
+_TIE = 1e-9  # [rad/m] above rounding, and below what anybody can measure
+
+ConstraintHold = ActuatorAngle | FixedExtension
+ChoiceHold = LeastExtension | NearestHorizontal | LeastTorque | NearestPose | LargestMargin
+Hold = ConstraintHold | ChoiceHold
+
+
+def measure(boom: Boom, hold: Hold, reference: ArrayLike | None = None) -> ChoiceHold:
+    """What the best of several branches has least of: a choice hold's own cost, else the distance to a reference pose.
+
+    Raises:
+        InputError: reference is not finite or not (5,).
+    """
+    if isinstance(hold, ConstraintHold):
+        return NearestPose.to((boom.limits.lower + boom.limits.upper) / 2.0 if reference is None else reference)
+    return hold
+
+
+def _spans(boom: Boom) -> Array:
+    span = boom.limits.upper - boom.limits.lower
+    return np.where(span > 0.0, span, 1.0)

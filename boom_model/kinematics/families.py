@@ -1,0 +1,135 @@
+"""All joint positions that put the tip at a target with a pitch, and the best of them under a choice hold.
+
+They are a one-parameter family, and theta2 is its parameter. With W = (F, G) of `closure` and V = W - L9 e(theta2),
+
+    rho = sqrt(|V|^2 - L6^2),   theta3 = angle(-V) - atan2(L6, rho),   theta5 = phi - theta3.
+
+Where a limit is met, theta2 has a closed form: extension and actuator's angle held there (inverse kinematics), or the angle
+delta between lower and inner link (the coupled limit), by |W|^2 = (L9 - rho cos(delta) + L6 sin(delta))^2 + (rho sin(delta) +
+L6 cos(delta))^2. Between two such points the family is within the limits or outside as a whole, so that the feasible
+intervals are exact. A cost is least at one of their ends, at a stationary point in closed form, or at a minimum found by a
+scan of the whole interval and refined.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from boom_model.arrays import Array, Mask
+from boom_model.boom import Boom
+from boom_model.kinematics.closure import closed_by_angle, closed_by_extension, turned_into_limits
+from boom_model.kinematics.constraints import ChoiceHold, LeastExtension, NearestHorizontal
+
+_SCAN = 64
+_REFINEMENTS = 60
+_SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
+
+
+class Targets(NamedTuple):
+    """Targets with a side of the base each, all of shape (n,)."""
+
+    theta1: Array
+    F: Array
+    G: Array
+    phi: Array
+
+
+def member(boom: Boom, targets: Targets, theta2: Array) -> Array:
+    """The family's joint positions (n, k, 5) at theta2 (n, k); NaN where the actuator cannot close the loop."""
+    g = boom.geometry
+    theta1, F, G, phi = (x[:, None] for x in targets)
+    x, z = F - g.L9 * np.cos(theta2), G - g.L9 * np.sin(theta2)
+    square = x * x + z * z - g.L6**2
+    rho = np.sqrt(np.where(square > 0.0, square, np.nan))
+    theta3 = np.arctan2(-z, -x) - np.arctan2(g.L6, rho)
+    q = np.stack(np.broadcast_arrays(theta1, theta2, theta3, rho - g.L7, phi - theta3), axis=-1)
+    return turned_into_limits(boom, q)
+
+
+def best_member(boom: Boom, targets: Targets, hold: ChoiceHold) -> tuple[Array, Mask]:
+    """The member within the limits with the least cost, (n, 5), and whether there is one, (n,)."""
+    ends = _ends(boom, targets, hold)
+    at_ends = member(boom, targets, ends)
+    best, cost = _least(boom, hold, at_ends, ends)
+    if not isinstance(hold, LeastExtension | NearestHorizontal):  # theirs are among the ends
+        best, cost = _inside(boom, targets, hold, ends, best, cost)
+    exists = np.isfinite(cost)
+    q = member(boom, targets, best[:, None])[:, 0]
+    q[~exists] = np.nan
+    return q, exists
+
+
+def _ends(boom: Boom, targets: Targets, hold: ChoiceHold) -> Array:
+    """theta2 (n, k) in order, within its own limits: wherever a limit is met, and where a closed cost is stationary."""
+    limits, g = boom.limits, boom.geometry
+    _, F, G, phi = targets
+    lower, upper = limits.lower, limits.upper
+    angles = [np.full_like(F, lower[2]), np.full_like(F, upper[2]), phi - lower[4], phi - upper[4]]
+    deltas = [limits.linkage]
+    points = [np.full_like(F, lower[1]), np.full_like(F, upper[1])]
+    if isinstance(hold, LeastExtension):
+        points.append(np.arctan2(G, F))  # the inner link towards the wrist
+    if isinstance(hold, NearestHorizontal):
+        angles.append(np.full_like(F, np.pi))
+        deltas += [np.pi / 2.0, -np.pi / 2.0]  # where theta3 turns round
+    for root in (1.0, -1.0):
+        for rho in (g.L7 + lower[3], g.L7 + upper[3]):
+            points.append(closed_by_extension(boom, np.full_like(F, rho), F, G, root).theta2)
+        points += [closed_by_angle(boom, angle, F, G, root).theta2 for angle in angles]
+        points += [_at_linkage_angle(boom, F, G, delta, root) for delta in deltas]
+    theta2 = np.stack(points, axis=-1)
+    theta2 = lower[1] + np.mod(theta2 - lower[1] + 1e-12, 2.0 * np.pi) - 1e-12
+    theta2 = np.where((theta2 >= lower[1] - 1e-12) & (theta2 <= upper[1] + 1e-12), theta2, lower[1])
+    return np.sort(np.clip(theta2, lower[1], upper[1]), axis=-1)
+
+
+def _at_linkage_angle(boom: Boom, F: Array, G: Array, delta: float, root: float) -> Array:
+    """theta2 where theta3 - theta2 = delta; NaN where it never is."""
+    g = boom.geometry
+    c, s = np.cos(delta), np.sin(delta)
+    room = (g.L9 * c) ** 2 - (g.L9**2 + g.L6**2 + 2.0 * g.L9 * g.L6 * s - F**2 - G**2)
+    rho = g.L9 * c + root * np.sqrt(np.where(room >= 0.0, room, np.nan))
+    theta2: Array = np.arctan2(G, F) - np.arctan2(-rho * s - g.L6 * c, g.L9 - rho * c + g.L6 * s)
+    return theta2
+
+
+def _least(boom: Boom, hold: ChoiceHold, q: Array, theta2: Array) -> tuple[Array, Array]:
+    """theta2 and cost (n,) of the cheapest of members (n, k, 5) within the limits; infinite where there is none."""
+    cost = _cost(boom, hold, q)
+    at = np.argmin(cost, axis=-1)[:, None]
+    return np.take_along_axis(theta2, at, axis=-1)[:, 0], np.take_along_axis(cost, at, axis=-1)[:, 0]
+
+
+def _cost(boom: Boom, hold: ChoiceHold, q: Array) -> Array:
+    allowed = np.asarray(boom.limits.hold(q))  # NaN is outside every limit
+    cost = np.full(q.shape[:-1], np.inf)
+    cost[allowed] = hold.cost(boom, q[allowed])
+    return cost
+
+
+def _inside(boom: Boom, targets: Targets, hold: ChoiceHold, ends: Array, best: Array, cost: Array) -> tuple[Array, Array]:
+    """The better of what the ends gave and the least cost inside each feasible interval."""
+    middles = (ends[:, 1:] + ends[:, :-1]) / 2.0
+    feasible = np.isfinite(_cost(boom, hold, member(boom, targets, middles))) & (np.diff(ends, axis=-1) > 1e-9)
+    row, interval = np.nonzero(feasible)
+    if row.size == 0:
+        return best, cost
+    theirs = Targets(*(x[row] for x in targets))
+    low, high = ends[row, interval], ends[row, interval + 1]
+    scan = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _SCAN + 1)
+    costs = _cost(boom, hold, member(boom, theirs, scan))
+    at = np.clip(np.argmin(costs, axis=-1), 1, _SCAN - 1)
+    pick = np.arange(row.size)
+    a, b = scan[pick, at - 1], scan[pick, at + 1]
+    for _ in range(_REFINEMENTS):  # golden section, on all intervals at once
+        c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
+        values = _cost(boom, hold, member(boom, theirs, np.stack([c, d], axis=-1)))
+        left = values[:, 0] <= values[:, 1]
+        a, b = np.where(left, a, c), np.where(left, d, b)
+    found = ((a + b) / 2.0)[:, None]
+    values = _cost(boom, hold, member(boom, theirs, found))[:, 0]
+    order = np.argsort(values)[::-1]  # the least of a row is written last
+    better = order[values[order] < cost[row[order]]]
+    best, cost = best.copy(), cost.copy()
+    best[row[better]], cost[row[better]] = found[better, 0], values[better]
+    return best, cost

@@ -1,0 +1,238 @@
+"""Tip pose and Jacobian in closed form, and the motion of every frame and body by recursion.
+
+With rho = L7 + theta4 and phi = theta3 + theta5, in the arm's vertical plane (r forward, z up):
+
+    r = L2 + L9 cos(theta2) - rho cos(theta3) + L6 sin(theta3) - L8 sin(phi)
+    z = L1 + L9 sin(theta2) - rho sin(theta3) - L6 cos(theta3) + L8 cos(phi)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, broadcast, checked
+from boom_model.boom import Boom
+from boom_model.dynamics.base_motion import BaseMotion
+from boom_model.errors import InputError
+from boom_model.kinematics.frames import BODY_FRAMES, SLIDING_ROW, THETA_RATES, Loop, frame_transforms
+
+
+@dataclass(frozen=True)
+class TipPose:
+    """Where the tip is and how it points, in frame 1."""
+
+    position: Array
+    """(..., 3) [m]"""
+    rotation: Array
+    """(..., 3, 3): R_1_11, thesis eq. 2.18 with entry (1, 3) corrected to +sin(theta1)."""
+    pitch: Array
+    """(...) elevation of the end effector above the boom's forward horizontal [rad], in (-pi, pi]: down is -pi/2."""
+
+
+def forward_kinematics(boom: Boom, q: ArrayLike) -> TipPose:
+    """Tip pose in closed form (thesis, eqs. 2.18 and 2.19).
+
+    Args:
+        q: (..., 5) joint positions [rad, the extension in m].
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+
+    >>> boom = Boom.load()
+    >>> [round(float(x), 3) for x in forward_kinematics(boom, boom.pose("phenotyping")).position]
+    [0.0, 2.29, 0.978]
+    """
+    q = checked("q", q, 5)
+    r, z = _tip_in_plane(boom, q)
+    c1, s1 = np.cos(q[..., 0]), np.sin(q[..., 0])
+    phi = q[..., 2] + q[..., 4]
+    cp, sp = np.cos(phi), np.sin(phi)
+    zero = np.zeros_like(cp)
+    rotation = np.stack(
+        [
+            np.stack([-c1 * sp, -c1 * cp, s1], axis=-1),
+            np.stack([-s1 * sp, -s1 * cp, -c1], axis=-1),
+            np.stack([cp, -sp, zero], axis=-1),
+        ],
+        axis=-2,
+    )
+    return TipPose(np.stack([c1 * r, s1 * r, z], axis=-1), rotation, np.asarray(np.arctan2(cp, -sp)))
+
+
+def jacobian(boom: Boom, q: ArrayLike) -> Array:
+    """Geometric Jacobian of the tip in frame 1, shape (..., 6, 5): [v; omega] = J qd.
+
+    Rows are velocity [m/s] over angular velocity [rad/s]; the inner link does not turn the tip, because the parallelogram
+    keeps the actuator's direction. Differentiates thesis eq. 2.19.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    q = checked("q", q, 5)
+    g = boom.geometry
+    rho = g.L7 + q[..., 3]
+    c1, s1 = np.cos(q[..., 0]), np.sin(q[..., 0])
+    c2, s2 = np.cos(q[..., 1]), np.sin(q[..., 1])
+    c3, s3 = np.cos(q[..., 2]), np.sin(q[..., 2])
+    cp, sp = np.cos(q[..., 2] + q[..., 4]), np.sin(q[..., 2] + q[..., 4])
+    r, _ = _tip_in_plane(boom, q)
+    zero, one = np.zeros_like(r), np.ones_like(r)
+    dr = (-g.L9 * s2, rho * s3 + g.L6 * c3 - g.L8 * cp, -c3, -g.L8 * cp)
+    dz = (g.L9 * c2, -rho * c3 + g.L6 * s3 - g.L8 * sp, -s3, -g.L8 * sp)
+    columns = [np.stack([-s1 * r, c1 * r, zero, zero, zero, one], axis=-1)]
+    for i, turn in enumerate((zero, one, zero, one)):
+        columns.append(np.stack([c1 * dr[i], s1 * dr[i], dz[i], s1 * turn, -c1 * turn, zero], axis=-1))
+    return np.stack(columns, axis=-1)
+
+
+def jacobian_rate(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
+    """Time derivative of `jacobian`, (..., 6, 5): the tip's acceleration is J qdd + dJ/dt qd.
+
+    Raises:
+        InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
+    """
+    q, qd = broadcast(q=q, qd=qd)
+    g = boom.geometry
+    v1, v2, v3, v4, _ = np.moveaxis(qd, -1, 0)
+    rho, vt = g.L7 + q[..., 3], qd[..., 2] + qd[..., 4]
+    c1, s1 = np.cos(q[..., 0]), np.sin(q[..., 0])
+    c2, s2 = np.cos(q[..., 1]), np.sin(q[..., 1])
+    c3, s3 = np.cos(q[..., 2]), np.sin(q[..., 2])
+    ct, st = np.cos(q[..., 2] + q[..., 4]), np.sin(q[..., 2] + q[..., 4])
+    # Each column in the arm's plane, (r, z), and how it changes there; the yaw turns it besides.
+    r, _ = _tip_in_plane(boom, q)
+    across = (-g.L9 * s2, rho * s3 + g.L6 * c3 - g.L8 * ct, -c3, -g.L8 * ct)
+    r_rates = (-g.L9 * c2 * v2, v4 * s3 + (rho * c3 - g.L6 * s3) * v3 + g.L8 * st * vt, s3 * v3, g.L8 * st * vt)
+    z_rates = (-g.L9 * s2 * v2, -v4 * c3 + (rho * s3 + g.L6 * c3) * v3 - g.L8 * ct * vt, -c3 * v3, -g.L8 * ct * vt)
+    r_rate = sum(a * v for a, v in zip(across, np.moveaxis(qd[..., 1:], -1, 0), strict=True))
+    zero = np.zeros_like(r)
+    columns = [np.stack([-c1 * v1 * r - s1 * r_rate, c1 * r_rate - s1 * v1 * r, zero, zero, zero, zero], axis=-1)]
+    for a, a_rate, z_rate, turns in zip(across, r_rates, z_rates, (0.0, 1.0, 0.0, 1.0), strict=True):
+        x_rate, y_rate = c1 * a_rate - s1 * v1 * a, s1 * a_rate + c1 * v1 * a
+        columns.append(np.stack([x_rate, y_rate, z_rate, c1 * v1 * turns, s1 * v1 * turns, zero], axis=-1))
+    return np.stack(columns, axis=-1)
+
+
+def manipulability(boom: Boom, q: ArrayLike) -> Array:
+    """Yoshikawa's measure of the tip's translation, sqrt(det(J_v J_v^T)), shape (...); 0 where a direction is lost.
+
+    Its rows are in m per rad, and m per m for the extension: compare it between poses, not between arms.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    J = jacobian(boom, q)[..., :3, :]
+    measure: Array = np.sqrt(np.maximum(np.linalg.det(J @ np.swapaxes(J, -1, -2)), 0.0))
+    return measure
+
+
+def transmission_angle(q: ArrayLike) -> Array:
+    """Acute angle (...) between the inner and the lower link [rad]; the parallelogram is flat at 0, square at pi/2.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    q = checked("q", q, 5)
+    angle: Array = np.arcsin(np.abs(np.sin(q[..., 2] - q[..., 1])))
+    return angle
+
+
+@dataclass(frozen=True, eq=False)
+class FrameMotion:
+    """Motion of every frame of a loop over the ground, along the axes of frame 1; entry i - 1 is frame i."""
+
+    T: Array
+    """(..., 11, 4, 4): T_1_i."""
+    velocity: Array
+    """(..., 11, 3) of the origin [m/s]"""
+    angular_velocity: Array
+    """(..., 11, 3) [rad/s]"""
+    acceleration: Array
+    """(..., 11, 3) of the origin [m/s^2], gravity not counted"""
+    angular_acceleration: Array
+    """(..., 11, 3) [rad/s^2]"""
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMotion:
+    """Motion of a body over the ground, along the axes of frame 1, each (..., 3) but for its pose."""
+
+    T: Array
+    """(..., 4, 4): T_1_body."""
+    com: Array
+    velocity: Array
+    """of the centre of mass"""
+    angular_velocity: Array
+    acceleration: Array
+    """of the centre of mass, gravity not counted"""
+    angular_acceleration: Array
+
+
+def frame_motion(
+    boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, loop: Loop, base: BaseMotion | None = None
+) -> FrameMotion:
+    """Outward recursion over one loop (thesis, eqs. 2.39-2.43 as corrected), along the axes of frame 1.
+
+    Raises:
+        InputError: an input is not finite or of the wrong shape, or shapes do not match.
+    """
+    q, qd, qdd = broadcast(q=q, qd=qd, qdd=qdd)
+    T = frame_transforms(boom, q, loop)
+    spin, spin_up = qd @ THETA_RATES[loop].T, qdd @ THETA_RATES[loop].T
+    base = BaseMotion.of() if base is None else base
+    start = (base.velocity, base.angular_velocity, base.acceleration, base.angular_acceleration)
+    try:
+        v, w, a, w1 = (np.broadcast_to(x, (*q.shape[:-1], 3)) for x in start)
+    except ValueError:
+        raise InputError(f"base motion does not match states of shape {q.shape}") from None
+    frames = [(v, w, a, w1)]
+    for row in range(10):
+        r = T[..., row + 1, :3, 3] - T[..., row, :3, 3]
+        z = T[..., row + 1, :3, 2]
+        v = v + np.cross(w, r)
+        a = a + np.cross(w1, r) + np.cross(w, np.cross(w, r))
+        if row == SLIDING_ROW:
+            slide = qd[..., 3, None] * z
+            v, a = v + slide, a + 2.0 * np.cross(w, slide) + qdd[..., 3, None] * z
+        turn = spin[..., row, None] * z
+        w1 = w1 + np.cross(w, turn) + spin_up[..., row, None] * z
+        w = w + turn
+        frames.append((v, w, a, w1))
+    return FrameMotion(T, *(np.stack(part, axis=-2) for part in zip(*frames, strict=True)))
+
+
+def body_motion(
+    boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, base: BaseMotion | None = None
+) -> dict[str, BodyMotion]:
+    """Motion of every body and its centre of mass (thesis, eq. 2.44), by name; the payload's is that of frame 11.
+
+    Raises:
+        InputError: an input is not finite or of the wrong shape, or shapes do not match.
+    """
+    loops = {loop: frame_motion(boom, q, qd, qdd, loop, base) for loop in ("inner", "outer")}
+    placed = {**BODY_FRAMES, "payload": ("outer", 11)}
+    motions = {}
+    for name, body in {**boom.bodies, "payload": boom.payload}.items():
+        loop, frame = placed[name]
+        m, i = loops[loop], frame - 1
+        w, w1 = m.angular_velocity[..., i, :], m.angular_acceleration[..., i, :]
+        r = m.T[..., i, :3, :3] @ body.com
+        motions[name] = BodyMotion(
+            T=m.T[..., i, :, :],
+            com=m.T[..., i, :3, 3] + r,
+            velocity=m.velocity[..., i, :] + np.cross(w, r),
+            angular_velocity=w,
+            acceleration=m.acceleration[..., i, :] + np.cross(w1, r) + np.cross(w, np.cross(w, r)),
+            angular_acceleration=w1,
+        )
+    return motions
+
+
+def _tip_in_plane(boom: Boom, q: Array) -> tuple[Array, Array]:
+    g = boom.geometry
+    _, t2, t3, t4, t5 = np.moveaxis(q, -1, 0)
+    rho, phi = g.L7 + t4, t3 + t5
+    r: Array = g.L2 + g.L9 * np.cos(t2) - rho * np.cos(t3) + g.L6 * np.sin(t3) - g.L8 * np.sin(phi)
+    z: Array = g.L1 + g.L9 * np.sin(t2) - rho * np.sin(t3) - g.L6 * np.cos(t3) + g.L8 * np.cos(phi)
+    return r, z

@@ -1,0 +1,435 @@
+"""A measured motion beside its plan: joint and tip errors, and the torques of both.
+
+A log holds positions, and it may hold velocities, accelerations and torques. Encoders are noisy, and differentiating twice
+amplifies the noise of a step h by some 1/h^2. What a log lacks is therefore taken from a Savitzky-Golay filter: a cubic is
+fitted to the samples of a window about each sample, and its derivatives in the middle are the motion's. That assumes that
+the motion is a cubic within any window, and that the noise of a sample has nothing to do with that of the next. Then the
+filter, a weighted sum with weights w, makes noise of standard deviation sigma into one of
+
+    sigma sqrt(sum w^2),    about sigma sqrt(720 / N^5) / h^2 for accelerations from N positions.
+
+What that makes of the torques follows from their derivatives by q, qd and qdd, the last of which is M(q). A wider window passes
+less noise, and rounds off more of the motion.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model import JOINTS, Basis, Boom, InputError, forward_kinematics, inverse_dynamics
+from boom_model.arrays import Array, Mask, checked, read_only, scalar
+from boom_model.boom import IS_LENGTH
+from boom_model.dynamics.newton_euler import PayloadAs
+from planner.motion.motion_files import read_quantities
+from planner.motion.trajectory import Trajectory
+from planner.planning import torques
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
+
+WINDOW = 0.2
+"""Default width of the smoothing window [s]; our own choice: a twentieth of the main move."""
+
+_ORDER = 3
+_EVEN = 0.01  # steps that differ by less than this share count as even
+_SHIFTS = 50_000  # that the alignment tries at most, before it goes on between two of them
+_LOOKED_AT = 20_000  # samples of a log that it looks at there
+_DIFFERENCE = 1e-5
+_WEIGHED = 200  # samples at which the torques' noise is worked out
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """A measured motion at times t (n,), in rad, m and s; each of the rest (n, 5), None where it was not measured."""
+
+    t: Array
+    q: Array
+    qd: Array | None = None
+    qdd: Array | None = None
+    tau: Array | None = None
+    """At the joints, behind the gearboxes [Nm, the extension's N]."""
+    notes: tuple[str, ...] = ()
+
+    @staticmethod
+    def of(
+        t: ArrayLike,
+        q: ArrayLike,
+        qd: ArrayLike | None = None,
+        qdd: ArrayLike | None = None,
+        tau: ArrayLike | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> "Log":
+        """A log from arrays, checked.
+
+        Raises:
+            InputError: not finite, shapes that do not match, no sample, or times that do not increase.
+        """
+        some = {"qd": qd, "qdd": qdd, "tau": tau}
+        given = {name: checked(name, values, 5) for name, values in some.items() if values is not None}
+        plain = Trajectory.from_samples(t, q, np.zeros(np.shape(q)), np.zeros(np.shape(q)))
+        for name, values in given.items():
+            if values.shape != plain.q.shape:
+                raise InputError(f"{name} has shape {values.shape}; with {plain.t.size} times it must be {plain.q.shape}")
+        return Log(plain.t, plain.q, notes=notes, **{name: read_only(values) for name, values in given.items()})
+
+
+def read_log(path: str | Path) -> Log:
+    """A log from CSV or Parquet: t, q1..q5, and any of qd1..qd5, qdd1..qdd5 and tau1..tau5.
+
+    Raises:
+        InputError: as `read_motion`, but that qd may stand without qdd.
+    """
+    data, notes = read_quantities(path)
+    try:
+        return Log.of(**data, notes=notes)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """A log with the derivatives that it lacks."""
+
+    trajectory: Trajectory
+    """Positions are the log's own; its notes say what was done."""
+    tau: Array | None
+    """The log's."""
+    noise: Array
+    """(5,) standard deviation of the positions' noise, by what the filter takes off [rad, m]"""
+    covariance: Array
+    """(5, 3, 3) of the noise of each joint's q, qd and qdd; 0 for a qd or qdd that the log has"""
+    inside: Mask
+    """(n,) True where the whole window lies in the log; towards its ends the filter's derivatives are worse"""
+
+
+def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
+    """The log with its derivatives: those that it has, as they are; velocities from its positions, and accelerations from its
+    velocities or else from its positions, by a cubic Savitzky-Golay filter over `window` seconds.
+
+    A log whose steps differ by more than 1 % is first read off at even ones, along straight lines.
+
+    Raises:
+        InputError: the window is not a positive number, holds less than 5 samples or more than the log has, or is shorter than
+            a gap in the log.
+    """
+    from scipy.signal import savgol_coeffs, savgol_filter
+
+    window = scalar("window", window)
+    if not window > 0.0:
+        raise InputError(f"window is {window:g} s; it must be above 0 s")
+    log = _even(log, window)
+    n = log.t.size
+    h = float(log.t[-1] - log.t[0]) / max(n - 1, 1)
+    N = 2 * round(min(0.5 * window / h, n)) + 1 if h > 0.0 else 1
+    if N < _ORDER + 2:
+        raise InputError(f"a window of {window:g} s holds {N} samples of a log with steps of {h:g} s; it must hold 5 at least")
+    if n < N:
+        raise InputError(f"the log has {n} samples; a window of {window:g} s needs {N}")
+
+    def derivative(values: Array, order: int) -> Array:
+        found: Array = savgol_filter(values, N, _ORDER, deriv=order, delta=h, axis=0)
+        return found
+
+    def spread(values: Array) -> Array:
+        kept = float(savgol_coeffs(N, _ORDER)[N // 2])  # of its own noise, which a smoothed sample keeps
+        removed = (values - derivative(values, 0))[inside]
+        rms: Array = np.sqrt(np.mean(removed**2, axis=0) / (1.0 - kept))
+        return rms
+
+    inside = np.zeros(n, dtype=bool)
+    inside[N // 2 : n - N // 2] = True
+    noise, by_filter = spread(log.q), f"by a cubic Savitzky-Golay filter over {N} samples, {(N - 1) * h:.4g} s"
+    notes, qd, qdd = list(log.notes), log.qd, log.qdd
+    weights = np.zeros((3, N))  # of a window's positions in q, qd and qdd
+    weights[0, N // 2] = 1.0
+    rates = savgol_coeffs(N, _ORDER, deriv=1, delta=h, use="dot")
+    from_velocities = np.zeros(5)
+    if qd is None:
+        qd, weights[1] = derivative(log.q, 1), rates
+        notes.append(f"velocities are not in the log: taken from its positions {by_filter}")
+    if qdd is None and log.qd is None:
+        qdd, weights[2] = derivative(log.q, 2), savgol_coeffs(N, _ORDER, deriv=2, delta=h, use="dot")
+        notes.append(f"accelerations are not in the log: taken from its positions {by_filter}")
+    elif qdd is None:
+        qdd, from_velocities = derivative(qd, 1), spread(qd) * np.linalg.norm(rates)
+        notes.append(f"accelerations are not in the log: taken from its velocities {by_filter}")
+    covariance = noise[:, None, None] ** 2 * (weights @ weights.T)
+    covariance[:, 2, 2] += from_velocities**2
+    if log.qd is not None and log.qdd is not None:
+        inside[:] = True
+    trajectory = Trajectory.from_samples(log.t, log.q, qd, qdd, notes=tuple(notes))
+    return Smoothed(trajectory, log.tau, noise, covariance, inside)
+
+
+def _even(log: Log, window: float) -> Log:
+    steps = np.diff(log.t)
+    if not steps.size or np.ptp(steps) <= _EVEN * steps.mean():
+        return log
+    if steps.max() > window:
+        at = int(steps.argmax())
+        raise InputError(
+            f"the log has a gap of {steps[at]:g} s after t = {log.t[at]:g} s, longer than the window of {window:g} s"
+        )
+    t = np.linspace(log.t[0], log.t[-1], log.t.size)
+    given = {name: values for name in ("q", "qd", "qdd", "tau") if (values := getattr(log, name)) is not None}
+    read = {name: np.stack([np.interp(t, log.t, column) for column in values.T], axis=-1) for name, values in given.items()}
+    note = f"the log's steps, {steps.min():.4g} s to {steps.max():.4g} s, are not even: read off every {steps.mean():.4g} s"
+    return Log(t, notes=(*log.notes, note), **read)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A plan and a log of it at common times: the log's, where the plan has something to say."""
+
+    boom: Boom
+    planned: Trajectory
+    """The plan at the common times, which count as its own do."""
+    measured: Trajectory
+    """The log at them, with its derivatives."""
+    offset: float
+    """What was added to the log's times [s]."""
+    best_offset: float
+    """The offset that makes the sum of the squared joint errors least, each joint as a share of its range [s]."""
+    tau_planned: Array
+    """(n, 5) by the model, of the plan"""
+    tau_measured: Array
+    """(n, 5) by the model, of the measured motion"""
+    tau_logged: Array | None
+    """(n, 5) as measured"""
+    tip_planned: Array
+    """(n, 3) in frame 1 [m]"""
+    tip_measured: Array
+    """(n, 3)"""
+    noise: Array
+    """(5,) of the log's positions, see `Smoothed`"""
+    torque_noise: Array
+    """(5,) standard deviation that the log's noise leaves in tau_measured: what differs by less may be noise"""
+    inside: Mask
+    """(n,) where tau_measured is as good as that; its peaks and means are taken there"""
+
+    @property
+    def joint_error(self) -> Array:
+        """Measured less planned, (n, 5)."""
+        return self.measured.q - self.planned.q
+
+    @property
+    def tip_error(self) -> Array:
+        """Distance of the two tips, (n,) [m]."""
+        error: Array = np.linalg.norm(self.tip_measured - self.tip_planned, axis=-1)
+        return error
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know of the two motions and of the model."""
+        given = zip(JOINTS, self.boom.friction.origins, strict=True)
+        return (
+            *(f"plan: {note}" for note in self.planned.notes),
+            *(f"log: {note}" for note in self.measured.notes),
+            *(f"{joint} friction is assumed: {o.source}" for joint, o in given if o is not None and o.basis is Basis.ASSUMED),
+        )
+
+    def to_json(self, files: dict[str, str]) -> dict[str, Any]:
+        """The JSON object of `boom compare`, in SI."""
+        t, tip = self.planned.t, self.tip_error
+        at = int(tip.argmax())
+        everywhere = np.ones(len(t), dtype=bool)
+        joints = []
+        for i, joint in enumerate(JOINTS):
+            torque: dict[str, Any] = {
+                "unit": "N" if IS_LENGTH[i] else "Nm",
+                "noise": float(self.torque_noise[i]),
+                "measured_less_planned": _extremes(t, (self.tau_measured - self.tau_planned)[:, i], self.inside),
+                "logged_less_measured": None,
+            }
+            if self.tau_logged is not None:
+                torque["logged_less_measured"] = _extremes(t, (self.tau_logged - self.tau_measured)[:, i], self.inside)
+            position = {"unit": "m" if IS_LENGTH[i] else "rad", "noise": float(self.noise[i])}
+            error = _extremes(t, self.joint_error[:, i], everywhere)
+            joints.append({"joint": joint, "position": position | {"error": error}, "torque": torque})
+        return {
+            "offset_s": self.offset,
+            "best_offset_s": self.best_offset,
+            "samples": len(t),
+            "from_s": float(t[0]),
+            "to_s": float(t[-1]),
+            "tip": {
+                "peak_m": float(tip[at]),
+                "at_s": float(t[at]),
+                "planned_m": self.tip_planned[at].tolist(),
+                "measured_m": self.tip_measured[at].tolist(),
+                "rms_m": float(np.sqrt(np.mean(tip**2))),
+                "mean_m": (self.tip_measured - self.tip_planned).mean(axis=0).tolist(),
+            },
+            "joints": joints,
+            "notes": list(self.notes),
+            "files": files,
+        }
+
+
+def compare(
+    boom: Boom,
+    planned: Trajectory,
+    log: Log,
+    *,
+    offset: float | None = 0.0,
+    window: float = WINDOW,
+    payload_as: PayloadAs = "mass",
+) -> Comparison:
+    """Plan and log at the log's times, as far as the plan goes.
+
+    The plan is interpolated: q by the cubic through its positions and velocities, qd by its derivative, qdd along straight
+    lines.
+    Torques are those of `torques`: on level ground, with friction where it is known, without the drives' own inertia.
+
+    Args:
+        offset: added to the log's times [s]; None takes the one that fits best, which also takes away a delay of the drives.
+        window: see `smoothed`.
+        payload_as: see `inverse_dynamics`.
+
+    Raises:
+        InputError: as `smoothed`; the plan has a single sample; or log and plan have no two samples in common.
+    """
+    if planned.t.size < 2:
+        raise InputError("the plan has a single sample; a comparison needs a motion")
+    ready = smoothed(log, window)
+    curve = _curve(planned)
+    best = _best_offset(boom, planned, curve, ready.trajectory)
+    offset = best if offset is None else scalar("offset", offset)
+    t = ready.trajectory.t + offset
+    common = (t >= planned.t[0]) & (t <= planned.t[-1])
+    if common.sum() < 2:
+        raise InputError(
+            f"the log, from {t[0]:g} to {t[-1]:g} s with its offset of {offset:g} s, and the plan, from {planned.t[0]:g} to "
+            f"{planned.t[-1]:g} s, have no two samples in common; the offset that fits best is {best:g} s"
+        )
+    t = t[common]
+    qdd = np.stack([np.interp(t, planned.t, column) for column in planned.qdd.T], axis=-1)
+    plan = Trajectory.from_samples(t, curve(t), curve(t, 1), qdd, notes=planned.notes)
+    source = ready.trajectory
+    measured = Trajectory.from_samples(t, source.q[common], source.qd[common], source.qdd[common], notes=source.notes)
+    return Comparison(
+        boom=boom,
+        planned=plan,
+        measured=measured,
+        offset=offset,
+        best_offset=best,
+        tau_planned=torques(boom, plan, payload_as),
+        tau_measured=torques(boom, measured, payload_as),
+        tau_logged=None if ready.tau is None else ready.tau[common],
+        tip_planned=forward_kinematics(boom, plan.q).position,
+        tip_measured=forward_kinematics(boom, measured.q).position,
+        noise=ready.noise,
+        torque_noise=_torque_noise(boom, plan, ready.covariance, payload_as),
+        inside=ready.inside[common],
+    )
+
+
+POSITION_HEADER = ("joint", "largest error", "at", "RMS", "mean", "noise")
+TORQUE_HEADER = ("joint", "largest difference", "at", "RMS", "noise", "log: largest", "at", "RMS")
+
+
+def position_cells(joint: dict[str, Any]) -> tuple[str, ...]:
+    """A joint of `Comparison.to_json` for people, under POSITION_HEADER."""
+    position = joint["position"]
+    error = position["error"]
+    factor, unit = (1e3, "mm") if position["unit"] == "m" else (180.0 / np.pi, "deg")
+    shown = [f"{value * factor:.4g} {unit}" for value in (error["peak"], error["rms"], error["mean"], position["noise"])]
+    return joint["joint"], shown[0], f"{error['at_s']:.3f} s", *shown[1:]
+
+
+def torque_cells(joint: dict[str, Any]) -> tuple[str, ...]:
+    """A joint of `Comparison.to_json` for people, under TORQUE_HEADER."""
+    torque = joint["torque"]
+
+    def shown(found: dict[str, float | None] | None) -> tuple[str, str, str]:
+        if found is None or found["peak"] is None:
+            return "-", "-", "-"
+        return f"{found['peak']:.4g} {torque['unit']}", f"{found['at_s']:.3f} s", f"{found['rms']:.4g} {torque['unit']}"
+
+    noise = f"{torque['noise']:.3g} {torque['unit']}"
+    return joint["joint"], *shown(torque["measured_less_planned"]), noise, *shown(torque["logged_less_measured"])
+
+
+def summary(answer: dict[str, Any]) -> list[str]:
+    """`Comparison.to_json` in sentences: when, and where the tip was."""
+    tip = answer["tip"]
+    where = ", ".join(f"{x:.3f}" for x in tip["planned_m"])
+    return [
+        f"{answer['samples']} samples from {answer['from_s']:.3f} to {answer['to_s']:.3f} s; the log's times have "
+        f"{answer['offset_s']:.4f} s added, and {answer['best_offset_s']:.4f} s would fit best",
+        f"tip: up to {tip['peak_m'] * 1e3:.2f} mm off, at {tip['at_s']:.3f} s where ({where}) m was planned; "
+        f"RMS {tip['rms_m'] * 1e3:.2f} mm",
+    ]
+
+
+def _curve(planned: Trajectory) -> "CubicHermiteSpline":
+    from scipy.interpolate import CubicHermiteSpline
+
+    return CubicHermiteSpline(planned.t, planned.q, planned.qd)
+
+
+def _best_offset(boom: Boom, planned: Trajectory, curve: "CubicHermiteSpline", measured: Trajectory) -> float:
+    """The least of the sum of squared errors, each joint as a share of its range; the plan rests before and after itself.
+
+    At every shift k of a grid, sum_i (q_i - p_i+k)^2 = sum q_i^2 - 2 sum q_i p_i+k + sum p_i+k^2; then about the least of them.
+    """
+    from scipy.optimize import minimize_scalar
+    from scipy.signal import correlate
+
+    weight = 1.0 / np.maximum(boom.limits.upper - boom.limits.lower, 1e-9)
+    start, end = planned.t[[0, -1]]
+
+    def plan_at(t: Array) -> Array:
+        away: Array = (curve(np.clip(t, start, end)) - planned.q[0]) * weight
+        return away
+
+    first, last = measured.t[[0, -1]]
+    step = (end - start + 2.0 * (last - first)) / _SHIFTS
+    log_grid = np.arange(first, last, step)
+    plan_grid = np.arange(start - (last - first), end + (last - first), step)
+    p, cost = plan_at(plan_grid), np.zeros(plan_grid.size - log_grid.size + 1)
+    for i in range(5):
+        q = (np.interp(log_grid, measured.t, measured.q[:, i]) - planned.q[0, i]) * weight[i]
+        squares = np.concatenate([[0.0], np.cumsum(p[:, i] ** 2)])
+        cost += squares[log_grid.size :] - squares[: -log_grid.size] - 2.0 * correlate(p[:, i], q, mode="valid", method="fft")
+    coarse = float(plan_grid[cost.argmin()] - first)
+    some = slice(None, None, max(1, measured.t.size // _LOOKED_AT))
+    t, q = measured.t[some], (measured.q[some] - planned.q[0]) * weight
+
+    def error(offset: float) -> float:
+        return float(np.sum((q - plan_at(t + offset)) ** 2))
+
+    found = minimize_scalar(error, bounds=(coarse - step, coarse + step), method="bounded", options={"xatol": 1e-9})
+    return float(found.x)
+
+
+def _torque_noise(boom: Boom, plan: Trajectory, covariance: Array, payload_as: PayloadAs) -> Array:
+    """Root mean square over some of the samples of what noise of that covariance makes of the torques, (5,):
+
+    var(tau_i) = sum_j D_ij^T covariance_j D_ij,    D_ij = (dtau_i/dq_j, dtau_i/dqd_j, dtau_i/dqdd_j).
+    """
+    some = slice(None, None, max(1, plan.t.size // _WEIGHED))
+    state = [values[some, None, :] for values in (plan.q, plan.qd, plan.qdd)]
+    steps = _DIFFERENCE * np.eye(5)
+
+    def tau(moved: int, by: Array) -> Array:
+        at = [values + by if i == moved else values for i, values in enumerate(state)]
+        return inverse_dynamics(boom, *at, payload_as=payload_as, reactions=False).tau
+
+    D = np.stack([tau(k, steps) - tau(k, -steps) for k in range(3)], axis=-1) / (2.0 * _DIFFERENCE)  # (n, j, i, 3)
+    D[..., 1] += np.diag(boom.friction.viscous)
+    noise: Array = np.sqrt(np.einsum("njia,jab,njib->ni", D, covariance, D).mean(axis=0))
+    return noise
+
+
+def _extremes(t: Array, values: Array, where: Mask) -> dict[str, float | None]:
+    """Of values (n,): the one of largest size and when, root mean square and mean; None where nothing is looked at."""
+    t, values = t[where], values[where]
+    if not values.size:
+        return dict.fromkeys(("peak", "at_s", "rms", "mean"))
+    at = int(np.abs(values).argmax())
+    rms, mean = np.sqrt(np.mean(values**2)), values.mean()
+    return {"peak": float(values[at]), "at_s": float(t[at]), "rms": float(rms), "mean": float(mean)}

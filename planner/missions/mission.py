@@ -1,0 +1,339 @@
+"""A duty cycle of several moves, holds and pauses, from a TOML file to the samples and times that the checks look at.
+
+A **hold** stands with the motors on; in a **pause** the brakes hold, and a motor is off where its joint has one. Moves come
+back in a cycle, so each different one is planned and sampled once and carries how often it is made.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.resources import files
+from itertools import islice
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from boom_model import BaseMotion, Basis, Boom, InfeasibleError, InputError, Origin, Sourced, forward_kinematics, up_on_slope
+from boom_model.arrays import Array, read_only
+from boom_model.dynamics.newton_euler import PayloadAs
+from boom_model.toml_file import Positive, Table, read_toml
+from planner.checks.drives.duty import Duty, trapezoid_weights
+from planner.files import named_file
+from planner.motion.trajectory import STEP, Trajectory, joined, sample
+from planner.motion.vehicle import VehicleCase
+from planner.paths.legs import legs
+from planner.paths.targets import TipTarget, parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target, resolve
+from planner.planning import CHECKS_PER_STEP, check
+from planner.progress import Track
+from planner.reports.report import Report
+from planner.timing.timing import Profile, Timing, timed
+
+_FOLDER = Path(str(files("planner.missions") / "named_missions"))
+_MOST_STEPS = 100_000
+_SAME_POSITION = 1e-6
+_DECIMALS = 9
+_DOWN, _HORIZONTAL = "down", "horizontal"
+
+
+class _Step(Table):
+    to: str | None = None
+    via: list[str] = Field(default_factory=list)
+    pass_via: bool = False
+    via_velocity: list[str] = Field(default_factory=list)
+    along: str = "joint"
+    profile: str = "cubic"
+    jerk_bound: bool = False
+    average_torque: bool = False
+    duration_s: Positive | None = None
+    pitch: str = _DOWN
+    hold: str = _HORIZONTAL
+    hold_s: Positive | None = None
+    pause_s: Positive | None = None
+    repeat: Annotated[int, Field(gt=0)] | None = None
+    steps: "list[_Step]" = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _one_of(self) -> "_Step":
+        given = [name for name in ("to", "hold_s", "pause_s", "repeat") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"a step has one of to, hold_s, pause_s and repeat; this one has {', '.join(given) or 'none'}")
+        allowed = {
+            "to": set(_Step.model_fields) - {"hold_s", "pause_s", "repeat", "steps"},
+            "repeat": {"repeat", "steps"},
+        }.get(given[0], {given[0]})
+        stray = sorted(self.model_fields_set - allowed)
+        if stray:
+            raise ValueError(f"a step with {given[0]} takes no {', '.join(stray)}")
+        if given[0] == "repeat" and not self.steps:
+            raise ValueError("a step with repeat needs steps of its own")
+        return self
+
+
+class _MissionTable(Table):
+    name: str
+    basis: Literal["printed", "estimated", "assumed"]
+    source: str
+    start: str
+    pitch: str = _DOWN
+    hold: str = _HORIZONTAL
+    required_life_h: Positive | None = None
+    tip_tolerance_mm: Positive | None = None
+    steps: Annotated[list[_Step], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class Mission:
+    """A duty cycle as its file gives it."""
+
+    name: str
+    origin: Origin
+    table: _MissionTable
+
+    @property
+    def required_life(self) -> Sourced[float] | None:
+        """What the gearboxes are to live, pauses included [s]."""
+        hours = self.table.required_life_h
+        return None if hours is None else Sourced(hours * 3600.0, self.origin)
+
+    @property
+    def tip_tolerance(self) -> Sourced[float] | None:
+        """[m]"""
+        tolerance = self.table.tip_tolerance_mm
+        return None if tolerance is None else Sourced(tolerance * 1e-3, self.origin)
+
+    @property
+    def jerk_limited(self) -> bool:
+        """Whether a step is planned within the jerk limits."""
+        return _jerk_limited(self.table.steps)
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """The mission itself, where it is assumed."""
+        return (f"the mission: {self.origin.source}",) if self.origin.basis is Basis.ASSUMED else ()
+
+
+def named_missions() -> tuple[str, ...]:
+    """Names of the missions that come with the toolkit."""
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+
+
+def load_mission(name: str) -> Mission:
+    """A named mission, or one from a TOML file of the same form (a name that ends in .toml).
+
+    Raises:
+        InputError: no such mission, or the file cannot be read or is malformed; the key is named.
+    """
+    table = read_toml(named_file(_FOLDER, name, "mission"), _MissionTable)
+    return Mission(table.name, Origin(Basis(table.basis), table.source), table)
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A move, a hold or a pause, from its own time 0."""
+
+    label: str
+    trajectory: Trajectory
+    moves: bool
+    powered: bool
+
+    def stretched(self, factor: float) -> "Leg":
+        """The same leg, its motion slower by `factor`; a hold or a pause as it is."""
+        if not self.moves or factor == 1.0:
+            return self
+        old = self.trajectory
+        slower = replace(
+            old,
+            t=read_only(old.t * factor),
+            qd=read_only(old.qd / factor),
+            qdd=read_only(old.qdd / factor**2),
+            qddd=None if old.qddd is None else read_only(old.qddd / factor**3),
+        )
+        return replace(self, trajectory=slower)
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """A mission's different legs, and the order in which it goes through them."""
+
+    mission: Mission
+    legs: tuple[Leg, ...]
+    order: tuple[int, ...]
+    """Index of each leg travelled, from first to last."""
+    notes: tuple[str, ...]
+
+    @cached_property
+    def counts(self) -> Array:
+        """How often each leg is travelled."""
+        return np.bincount(self.order, minlength=len(self.legs)).astype(float)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """Every different leg once, at the time of its first: times that do not fall, but may leap or stand."""
+        durations = np.array([self.legs[i].trajectory.duration for i in self.order])
+        begins = np.concatenate([[0.0], np.cumsum(durations)])
+        first = [begins[self.order.index(i)] for i in range(len(self.legs))]
+        parts = [leg.trajectory for leg in self.legs]
+        jerks = [part.qddd for part in parts if part.qddd is not None]
+        return Trajectory(
+            t=read_only(np.concatenate([part.t + begin for part, begin in zip(parts, first, strict=True)])),
+            **{name: read_only(np.concatenate([getattr(part, name) for part in parts])) for name in ("q", "qd", "qdd")},
+            qddd=read_only(np.concatenate(jerks)) if len(jerks) == len(parts) else None,
+            notes=self.notes,
+        )
+
+    @cached_property
+    def duty(self) -> Duty:
+        """How long the samples of `trajectory` last in all."""
+        weights = [trapezoid_weights(leg.trajectory.t) * n for leg, n in zip(self.legs, self.counts, strict=True)]
+        powered = [np.full(len(leg.trajectory.t), leg.powered) for leg in self.legs]
+        return Duty(
+            weight=read_only(np.concatenate(weights)),
+            powered=np.concatenate(powered),
+            required_life=self.mission.required_life,
+            tip_tolerance=self.mission.tip_tolerance,
+        )
+
+    def stretched(self, factor: float) -> "Cycle":
+        """The same cycle with every move slower by `factor`; holds and pauses last as they did."""
+        return Cycle(self.mission, tuple(leg.stretched(factor) for leg in self.legs), self.order, self.notes)
+
+    @property
+    def moves(self) -> list[slice]:
+        """The samples of each move in `trajectory`."""
+        return [samples for leg, samples in self.slices() if leg.moves]
+
+    def slices(self) -> Iterator[tuple[Leg, slice]]:
+        """Each leg and its samples in `trajectory`."""
+        begin = 0
+        for leg in self.legs:
+            end = begin + len(leg.trajectory.t)
+            yield leg, slice(begin, end)
+            begin = end
+
+
+def plan_cycle(
+    boom: Boom, mission: Mission, vehicle: VehicleCase | None = None, step: float = STEP, track: Track = iter
+) -> Cycle:
+    """A mission's legs, planned one after the other, sampled as finely as the checks of a lone move.
+
+    Args:
+        vehicle: a slope to stand on; what changes with time has no place in a cycle.
+        track: iterates over the steps, and may show how far it is.
+
+    Raises:
+        InputError: a step is malformed, or the vehicle does more than stand on a slope; the step is named.
+        InfeasibleError: a step cannot be done; the step is named.
+    """
+    check_steady(vehicle)
+    table = mission.table
+    q = resolve(boom, parse_target(table.start), parse_pitch(table.pitch), parse_hold(table.hold))
+    start, legs, known, order, notes = q, [], {}, [], []
+    steps = list(islice(_expanded(table.steps, "steps"), _MOST_STEPS + 1))
+    if len(steps) > _MOST_STEPS:
+        raise InputError(f"mission {mission.name}: more than {_MOST_STEPS:,} steps")
+    for where, part in track(steps):
+        key = (id(part), tuple(np.round(q, _DECIMALS) + 0.0))  # a cycle comes back to a position to rounding
+        if key not in known:
+            try:
+                leg, after, said = _leg(boom, part, q, vehicle, step)
+            except (InputError, InfeasibleError) as error:
+                kind = InputError if isinstance(error, InputError) else InfeasibleError
+                raise kind(f"mission {mission.name}, {where}: {error}") from None
+            if leg is not None:
+                legs.append(leg)
+            notes += [f"{leg.label if leg else where}: {sentence}" for sentence in said]
+            known[key] = (None if leg is None else len(legs) - 1, after)
+        index, q = known[key]
+        if index is not None:
+            order.append(index)
+    if not legs:
+        raise InputError(f"mission {mission.name}: nothing moves, and nothing lasts")
+    if np.abs(q - start).max() > _SAME_POSITION:
+        notes.append("the cycle ends elsewhere than it starts: the way back is not counted")
+    return Cycle(mission, tuple(legs), tuple(order), tuple(dict.fromkeys(notes)))
+
+
+def check_steady(vehicle: VehicleCase | None) -> None:
+    """A cycle stands on a slope at most.
+
+    Raises:
+        InputError: the vehicle moves.
+    """
+    if vehicle is not None and not vehicle.is_steady:
+        raise InputError(f"vehicle case {vehicle.name}: a mission takes a slope alone; check its moves with tracks and shocks")
+
+
+def check_cycle(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None) -> Report:
+    """The checks of a whole cycle: peaks over its legs, means over its time.
+
+    Raises:
+        InputError: the vehicle does more than stand on a slope.
+    """
+    check_steady(vehicle)
+    report = check(
+        boom, cycle.trajectory, payload_as=payload_as, vehicle=vehicle, profile=f"mission {cycle.mission.name}", duty=cycle.duty
+    )
+    stated = cycle.mission.assumptions
+    return replace(report, notes=(*leg_sentences(cycle), *report.notes), assumptions=(*stated, *report.assumptions))
+
+
+def leg_sentences(cycle: Cycle) -> tuple[str, ...]:
+    """How often each leg is travelled, and how long it takes."""
+    pairs = zip(cycle.legs, cycle.counts, strict=True)
+    return tuple(f"{count:.0f} x {leg.label}, {leg.trajectory.duration:.3f} s" for leg, count in pairs)
+
+
+def _expanded(steps: list[_Step], where: str) -> Iterator[tuple[str, _Step]]:
+    """Every step travelled, repeats written out, and where it stands in the file."""
+    for number, part in enumerate(steps, start=1):
+        name = f"{where} {number}"
+        for _ in range(part.repeat or 0):
+            yield from _expanded(part.steps, f"{name}, steps")
+        if part.repeat is None:
+            yield name, part
+
+
+def _jerk_limited(steps: list[_Step]) -> bool:
+    return any(step.jerk_bound or step.profile == Profile.JERK_LIMITED or _jerk_limited(step.steps) for step in steps)
+
+
+def _leg(
+    boom: Boom, part: _Step, q: Array, vehicle: VehicleCase | None, step: float
+) -> tuple[Leg | None, Array, tuple[str, ...]]:
+    """A step as a leg, None where it moves nothing; where it ends, and what is to be said of it."""
+    if part.to is not None:
+        return _move(boom, part, q, vehicle, step)
+    seconds, powered = (part.hold_s, True) if part.hold_s is not None else (part.pause_s, False)
+    zero = np.zeros((2, 5))
+    still = Trajectory.from_samples([0.0, seconds or 0.0], np.tile(q, (2, 1)), zero, zero, zero)
+    return Leg("hold" if powered else "pause", still, moves=False, powered=powered), q, ()
+
+
+def _move(
+    boom: Boom, part: _Step, q: Array, vehicle: VehicleCase | None, step: float
+) -> tuple[Leg | None, Array, tuple[str, ...]]:
+    along, target = parse_along(part.along), parse_target(str(part.to))
+    by_joints = isinstance(along, str) and along == "joint"
+    x, y, z = (float(v) for v in forward_kinematics(boom, q).position)
+    velocities = np.array([parse_joint_velocity(text) for text in part.via_velocity]) if part.via_velocity else None
+    timing = Timing.of(part.profile, part.duration_s, part.jerk_bound, part.average_torque, velocities)
+    targets = (q if by_joints else TipTarget((x, y, z)), *(parse_target(text) for text in part.via), target)
+    pitch, hold = parse_pitch(part.pitch), parse_hold(part.hold)
+    stops = not part.pass_via and velocities is None
+    paths, said = legs(boom, targets, pitch, hold, along, stops, reference=q)
+    if not paths:
+        return None, q, ()
+    tilt = None if vehicle is None else BaseMotion.of(up=up_on_slope(vehicle.roll, vehicle.pitch))
+    motions = timed(boom, paths, timing, tilt)
+    fine = joined([sample(motion, step / CHECKS_PER_STEP) for motion in motions])
+    apart = float(np.abs(fine.q[0] - q).max())
+    if apart > _SAME_POSITION:
+        raise InfeasibleError(
+            f"the line starts at another joint position than where the step before ends ({apart:.3g} rad or m off): "
+            "give both the same pitch and hold"
+        )
+    way = part.to if by_joints else f"{part.to} along {part.along}"
+    label = " ".join([f"to {way}", *(f"via {text}" for text in part.via)])
+    return Leg(label, fine, moves=True, powered=True), fine.q[-1], said

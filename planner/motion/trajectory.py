@@ -1,0 +1,235 @@
+"""A sampled motion, and its CSV form."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array, checked, read_only
+from boom_model.errors import InputError
+from planner.files import replacing
+from planner.timing.time_law import Motion
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+STEP = 0.01
+"""Default sampling step [s], the thesis's (section 3.5)."""
+
+_ROUNDING = 1e-9  # relative; a whole number of steps is not one more for rounding
+MOST_SAMPLES = 10_000_000
+"""Samples that a motion may have: a day at a controller's 100 Hz."""
+
+_QUANTITIES = ("q", "qd", "qdd")
+COLUMNS = ("t", *(f"{name}{i}" for name in _QUANTITIES for i in range(1, 6)))
+"""Header of a motion's CSV, in SI."""
+
+TORQUES = tuple(f"tau{i}" for i in range(1, 6))
+"""Columns that follow where torques are written, in Nm and N."""
+
+_FITTED = "velocities and accelerations are not in the file: taken from a cubic spline through its positions"
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Joint motion sampled at times t (n,): q, qd, qdd (n, 5), read-only, in rad, m and s."""
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    qddd: Array | None = None
+    """Jerk, of a motion that was planned with a limit on it."""
+    notes: tuple[str, ...] = ()
+    """What a reader of a report must know about where the samples come from."""
+
+    @staticmethod
+    def from_samples(
+        t: ArrayLike,
+        q: ArrayLike,
+        qd: ArrayLike,
+        qdd: ArrayLike,
+        qddd: ArrayLike | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> "Trajectory":
+        """A trajectory from arrays, checked.
+
+        Raises:
+            InputError: not finite, shapes that do not match, no sample, or times that do not increase.
+        """
+        t = checked("t", t)
+        if t.ndim != 1 or t.size == 0:
+            raise InputError(f"t has shape {t.shape}; it must be (n,) with at least one sample")
+        if (np.diff(t) <= 0).any():
+            at = int(np.argmax(np.diff(t) <= 0)) + 1
+            raise InputError(f"t[{at}] = {t[at]:g} s does not come after t[{at - 1}] = {t[at - 1]:g} s; times must increase")
+        arrays = {"q": q, "qd": qd, "qdd": qdd} | ({} if qddd is None else {"qddd": qddd})
+        ready = {name: read_only(checked(name, values, 5)) for name, values in arrays.items()}
+        for name, array in ready.items():
+            if array.shape != (t.size, 5):
+                raise InputError(f"{name} has shape {array.shape}; with {t.size} times it must be ({t.size}, 5)")
+        return Trajectory(t=read_only(t), notes=notes, **ready)
+
+    @property
+    def duration(self) -> float:
+        return float(self.t[-1] - self.t[0])
+
+
+def check_size(duration: float, step: float) -> None:
+    """Whether a motion of that duration can be sampled.
+
+    Raises:
+        InputError: it makes more than MOST_SAMPLES.
+    """
+    if duration > MOST_SAMPLES * step:
+        raise InputError(f"{duration:g} s at steps of {step:g} s make more than {MOST_SAMPLES:,} samples")
+
+
+def sample(motion: Motion, step: float = STEP) -> Trajectory:
+    """The motion at equal steps of at most `step` seconds, its two ends included.
+
+    Raises:
+        InputError: step is not a positive number.
+    """
+    if not float(checked("step", step)) > 0.0:
+        raise InputError(f"step is {step} s; it must be above 0 s")
+    check_size(motion.duration, step)
+    intervals = max(1, int(np.ceil(motion.duration / step * (1.0 - _ROUNDING))))
+    t = np.linspace(0.0, motion.duration, intervals + 1)
+    q, qd, qdd, qddd = motion(t)
+    return Trajectory.from_samples(t, q, qd, qdd, qddd if motion.law.jerk_limited else None)
+
+
+def joined(parts: Sequence[Trajectory], notes: tuple[str, ...] = ()) -> Trajectory:
+    """Trajectories one after the other, each from the rest in which the one before ends; that sample stands once."""
+    starts = np.concatenate([[0.0], np.cumsum([part.t[-1] for part in parts])])
+    kept = [slice(None), *[slice(1, None)] * (len(parts) - 1)]
+    t = np.concatenate([part.t[k] + start for part, k, start in zip(parts, kept, starts[:-1], strict=True)])
+    q, qd, qdd = (
+        np.concatenate([getattr(part, name)[k] for part, k in zip(parts, kept, strict=True)]) for name in ("q", "qd", "qdd")
+    )
+    jerks = [part.qddd[k] for part, k in zip(parts, kept, strict=True) if part.qddd is not None]
+    return Trajectory.from_samples(t, q, qd, qdd, np.concatenate(jerks) if len(jerks) == len(parts) else None, notes)
+
+
+def at_rest(q: Array, notes: tuple[str, ...] = ()) -> Trajectory:
+    """The empty move: one sample, standing still at q (5,)."""
+    zero = np.zeros((1, 5))
+    return Trajectory.from_samples([0.0], q[None], zero, zero, notes=notes)
+
+
+def write_csv(trajectory: Trajectory, path: str | Path, tau: Array | None = None) -> None:
+    """The motion as CSV, all digits, with tau1..tau5 appended where given.
+
+    Raises:
+        InputError: the file cannot be written; an old one is left as it was.
+    """
+    from pyarrow import csv
+
+    with replacing(path) as temporary:
+        options = csv.WriteOptions(quoting_style="none", quoting_header="none")
+        csv.write_csv(motion_table(trajectory, tau), temporary, options)
+
+
+def motion_table(trajectory: Trajectory, tau: Array | None = None) -> "pa.Table":
+    """The motion's columns under COLUMNS, and TORQUES where given."""
+    import pyarrow as pa
+
+    columns = [trajectory.t, *trajectory.q.T, *trajectory.qd.T, *trajectory.qdd.T]
+    names = list(COLUMNS)
+    if tau is not None:
+        columns += [*tau.T]
+        names += TORQUES
+    return pa.table([np.ascontiguousarray(c) for c in columns], names=names)
+
+
+def read_csv(path: str | Path) -> Trajectory:
+    """A motion from CSV: t, q1..q5, and qd1..qd5, qdd1..qdd5 or neither (then a cubic spline through q gives them).
+
+    Derivatives that are given are used as given. tau1..tau5 are passed over.
+
+    Raises:
+        InputError: the file cannot be read, is not CSV, lacks a column or has one that is not known, or holds no samples,
+            values that are not finite numbers, or times that do not increase.
+    """
+    return trajectory_of(path, quantities(path, csv_table(path)))
+
+
+def csv_table(path: str | Path) -> "pa.Table":
+    """The table in a motion's CSV, its known columns float64.
+
+    Raises:
+        InputError: the file cannot be read, or is not CSV.
+    """
+    import pyarrow as pa
+    from pyarrow import csv
+
+    numbers = dict.fromkeys((*COLUMNS, *TORQUES), pa.float64())
+    try:
+        return csv.read_csv(str(path), convert_options=csv.ConvertOptions(column_types=numbers))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except pa.ArrowInvalid as error:
+        raise InputError(f"{path}: not a motion's CSV: {error}") from None
+
+
+def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, with_torques: bool = False) -> dict[str, Array]:
+    """t (n,) and q, and qd, qdd and where asked for tau, as far as they are there, (n, 5) each, of a motion's table.
+
+    Args:
+        first: what a message calls the first sample.
+
+    Raises:
+        InputError: a column is missing, twice there or not known, or a value is not a finite number.
+    """
+    names = set(table.column_names)
+    _complain(path, "has twice the column", {name for name in names if table.column_names.count(name) > 1})
+    looked_for = (*_QUANTITIES, "tau") if with_torques else _QUANTITIES
+    found = [name for name in looked_for if name == "q" or any(f"{name}{i}" in names for i in range(1, 6))]
+    needed = {"t", *(f"{name}{i}" for name in found for i in range(1, 6))}
+    _complain(path, "lacks the column", needed - names)
+    _complain(path, "has an unknown column", names - {*COLUMNS, *TORQUES})
+    unit, start = first.split()
+    for name in needed:
+        values = table[name].to_numpy()
+        if not np.isfinite(values).all():
+            row = int(np.argmin(np.isfinite(values)))
+            raise InputError(f"{path}: {unit} {row + int(start)}, column {name}: {values[row]} is not a finite number")
+    stacked = {name: np.stack([table[f"{name}{i}"].to_numpy() for i in range(1, 6)], axis=-1) for name in found}
+    return {"t": table["t"].to_numpy()} | stacked
+
+
+def trajectory_of(path: str | Path, data: dict[str, Array], notes: tuple[str, ...] = ()) -> Trajectory:
+    """The motion in a file's quantities; a spline gives qd and qdd where neither is there.
+
+    Raises:
+        InputError: only one of qd and qdd, no samples, times that do not increase, or too few samples for the spline.
+    """
+    given = [name for name in ("qd", "qdd") if name in data]
+    if len(given) == 1:
+        _complain(path, "lacks the column", {f"{name}{i}" for name in {"qd", "qdd"} - {*given} for i in range(1, 6)})
+    try:
+        if given:
+            return Trajectory.from_samples(data["t"], data["q"], data["qd"], data["qdd"], notes=notes)
+        return _fitted(data["t"], data["q"], notes)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _fitted(t: Array, q: Array, notes: tuple[str, ...]) -> Trajectory:
+    from scipy.interpolate import CubicSpline
+
+    still = np.zeros_like(q)
+    plain = Trajectory.from_samples(t, q, still, still)
+    if t.size < 4:
+        raise InputError(f"{t.size} samples without velocities and accelerations; a spline needs at least 4")
+    spline = CubicSpline(plain.t, plain.q)
+    return Trajectory.from_samples(t, q, spline(t, 1), spline(t, 2), notes=(*notes, _FITTED))
+
+
+def _complain(path: str | Path, what: str, names: set[str]) -> None:
+    if names:
+        raise InputError(f"{path}: {what} {', '.join(sorted(names))}; a motion has {','.join(COLUMNS)} or its first six")

@@ -1,0 +1,180 @@
+"""What the vehicle does to the boom's mount during a move: tilt on a slope, a sinusoidal track, a half-sine shock."""
+
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydantic import Field
+
+from boom_model import Basis, InputError, Origin
+from boom_model.arrays import Array, checked
+from boom_model.dynamics.base_motion import BaseMotion, up_on_slope
+from boom_model.toml_file import Finite, NonNegative, Positive, Table, read_toml
+from planner.files import named_file
+
+_FOLDER = Path(str(files("planner.motion") / "vehicle_cases"))
+
+
+@dataclass(frozen=True)
+class VehicleCase:
+    """A load case of the vehicle; its parts add up. Angles in rad, the rest in SI.
+
+    The mount follows the ground point by point: wheelbase, tyres and the mount's own place on the vehicle are left out. The
+    forward speed is constant, along the track as seen from above.
+    """
+
+    name: str
+    origin: Origin
+    roll: float = 0.0
+    """Slope: about the forward axis, left side up."""
+    pitch: float = 0.0
+    """Slope: nose down."""
+    amplitude: float = 0.0
+    """Track: the ground is z = amplitude sin(2 pi x / wavelength), x = speed t."""
+    wavelength: float = 1.0
+    speed: float = 0.0
+    peak: float = 0.0
+    """Shock: peak acceleration of a half-sine along `direction`."""
+    shock_duration: float = 1.0
+    shock_start: float = 0.0
+    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """Unit vector along frame 1."""
+    shock_events: float | None = None
+    """How many such shocks the drives are to survive; None where nobody says."""
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether it is a tilt alone, which does not change with time."""
+        return (self.amplitude == 0.0 or self.speed == 0.0) and self.peak == 0.0
+
+    @property
+    def sentence(self) -> str:
+        """What a report says of it."""
+        parts = []
+        if self.roll or self.pitch:
+            parts.append(f"slope: roll {np.degrees(self.roll):g} deg, pitch {np.degrees(self.pitch):g} deg")
+        if self.amplitude:
+            parts.append(f"track: {self.amplitude:g} m waves every {self.wavelength:g} m at {self.speed:g} m/s")
+        if self.peak:
+            parts.append(f"shock: half-sine of {self.peak:g} m/s^2 for {self.shock_duration:g} s from {self.shock_start:g} s")
+        said = "; ".join(parts) or "level ground, at rest"
+        return f"vehicle case {self.name}: {said} ({self.origin.basis}: {self.origin.source})"
+
+
+def base_motion(case: VehicleCase, t: ArrayLike) -> BaseMotion:
+    """How the case moves the base at times t (n,) [s].
+
+    With ground slope psi = atan(dz/dx) along the track the nose rises by psi, so that pitch = slope's pitch - psi; heave is
+    z(t), and its acceleration points against gravity.
+
+    Raises:
+        InputError: t is not finite.
+    """
+    t = checked("t", t)
+    k = 2.0 * np.pi / case.wavelength
+    phase = k * case.speed * t
+    steepness = case.amplitude * k * np.cos(phase)  # dz/dx, and its time derivatives
+    steepness_1 = -case.amplitude * k * np.sin(phase) * k * case.speed
+    steepness_2 = -steepness * (k * case.speed) ** 2
+    level = 1.0 + steepness**2
+    psi_1 = steepness_1 / level
+    psi_2 = steepness_2 / level - 2.0 * steepness * steepness_1**2 / level**2
+    heave_1 = steepness * case.speed
+    heave_2 = -case.amplitude * np.sin(phase) * (k * case.speed) ** 2
+    ahead, left, up = np.moveaxis(base_pose(case, t)[..., :3, :3], -2, 0)  # the ground's axes along frame 1
+    pulse = np.sin(np.pi * (t - case.shock_start) / case.shock_duration)
+    inside = (t >= case.shock_start) & (t <= case.shock_start + case.shock_duration)
+    shock = np.where(inside, case.peak * pulse, 0.0)[..., None] * np.asarray(case.direction)
+    return BaseMotion.of(
+        velocity=case.speed * ahead + heave_1[..., None] * up,
+        angular_velocity=-psi_1[..., None] * left,
+        acceleration=heave_2[..., None] * up + shock,
+        angular_acceleration=-psi_2[..., None] * left,
+        up=up,
+    )
+
+
+def base_pose(case: VehicleCase, t: ArrayLike) -> Array:
+    """T_ground_1 (n, 4, 4) at times t (n,): tilt and heave, without the way ahead.
+
+    Raises:
+        InputError: t is not finite.
+    """
+    t = checked("t", t)
+    k = 2.0 * np.pi / case.wavelength
+    phase = k * case.speed * t
+    pitch = case.pitch - np.arctan(case.amplitude * k * np.cos(phase))
+    T = np.zeros((*t.shape, 4, 4))
+    c, s = np.cos(case.roll), np.sin(case.roll)
+    T[..., 0, :3] = np.stack([np.cos(pitch), np.sin(pitch) * s, np.sin(pitch) * c], axis=-1)  # R_y(pitch) R_x(roll)
+    T[..., 1, :3] = [0.0, c, -s]
+    T[..., 2, :3] = up_on_slope(case.roll, pitch)
+    T[..., 2, 3] = case.amplitude * np.sin(phase)
+    T[..., 3, 3] = 1.0
+    return T
+
+
+class _Slope(Table):
+    roll_deg: Finite = 0.0
+    pitch_deg: Finite = 0.0
+
+
+class _Track(Table):
+    amplitude_m: NonNegative
+    wavelength_m: Positive
+    speed_m_s: Finite
+
+
+class _Shock(Table):
+    peak_m_s2: Finite
+    duration_s: Positive
+    start_s: Finite = 0.0
+    events: Positive | None = None
+    direction: Annotated[list[Finite], Field(min_length=3, max_length=3)] = Field(default_factory=lambda: [0.0, 0.0, 1.0])
+
+
+class _CaseTable(Table):
+    name: str
+    basis: Literal["printed", "estimated", "assumed"]
+    source: str
+    slope: _Slope = Field(default_factory=_Slope)
+    track: _Track | None = None
+    shock: _Shock | None = None
+
+
+def named_cases() -> tuple[str, ...]:
+    """Names of the cases that come with the toolkit."""
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+
+
+def load_case(name: str) -> VehicleCase:
+    """A named case, or one from a TOML file of the same form (a name that ends in .toml).
+
+    Raises:
+        InputError: no such case, or the file cannot be read or is malformed; the key is named.
+    """
+    path = named_file(_FOLDER, name, "vehicle case")
+    table = read_toml(path, _CaseTable)
+    track, shock = table.track, table.shock
+    direction = np.array([0.0, 0.0, 1.0] if shock is None else shock.direction)
+    length = float(np.linalg.norm(direction))
+    if length == 0.0:
+        raise InputError(f"{path}: key shock.direction: it is zero")
+    x, y, z = (float(d) for d in direction / length)
+    return VehicleCase(
+        name=table.name,
+        origin=Origin(Basis(table.basis), table.source),
+        roll=float(np.radians(table.slope.roll_deg)),
+        pitch=float(np.radians(table.slope.pitch_deg)),
+        amplitude=0.0 if track is None else track.amplitude_m,
+        wavelength=1.0 if track is None else track.wavelength_m,
+        speed=0.0 if track is None else track.speed_m_s,
+        peak=0.0 if shock is None else shock.peak_m_s2,
+        shock_duration=1.0 if shock is None else shock.duration_s,
+        shock_start=0.0 if shock is None else shock.start_s,
+        direction=(x, y, z),
+        shock_events=None if shock is None else shock.events,
+    )

@@ -1,0 +1,105 @@
+"""From targets to the paths between their stops."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model import Boom, InputError
+from boom_model.arrays import Array, checked
+from boom_model.boom import JOINTS
+from boom_model.kinematics.constraints import Hold
+from planner.paths.clearance import require_clear, require_path_clear
+from planner.paths.path import JointLine, Path, SplinePath, TipArc, TipLine, TipPath, follow, through
+from planner.paths.routing import detour
+from planner.paths.targets import Target, TipTarget, resolve
+
+Along = Literal["joint", "line"] | ArrayLike
+"""What leads a move: the joints, or the tip on a line or on an arc through a point."""
+
+
+def legs(
+    boom: Boom,
+    targets: Sequence[Target],
+    pitch: float | None,
+    hold: Hold,
+    along: Along,
+    stops: bool,
+    reference: ArrayLike | None = None,
+) -> tuple[list[Path], tuple[str, ...]]:
+    """A path between each stop and the next, on branches that go on from each other, and what a report says of them.
+
+    There is none between equal positions. Where the boom has shapes to keep away from, straight joint moves are led round
+    them by way of poses that the notes name; other paths are refused where they come too near.
+
+    Args:
+        stops: whether the targets between the first and the last are stops; else one smooth path goes through them.
+        reference: joint position (5,) that the start of a tip line or arc is nearest to; None is the middle of the ranges.
+
+    Raises:
+        InputError: what leads the move does not fit the targets.
+        InfeasibleError: a target or a path is out of reach, outside the limits or too near to a shape.
+    """
+    if isinstance(along, str) and along == "joint":
+        paths, notes = _joint_paths(boom, targets, pitch, hold, stops)
+    else:
+        if not stops:
+            raise InputError("a move through targets without a stop is led by the joints, not by a line or an arc of the tip")
+        paths, notes = _tip_paths(boom, targets, pitch, hold, along, reference), ()
+    for path in paths:
+        if not isinstance(path, JointLine):  # a straight move is on a way that has been found clear
+            require_path_clear(boom, path)
+    return paths, (*notes, *(path.sentence for path in paths if isinstance(path, TipPath | SplinePath)))
+
+
+def _joint_paths(
+    boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, stops: bool
+) -> tuple[list[Path], tuple[str, ...]]:
+    found: list[Array] = []
+    for target in targets:
+        found.append(resolve(boom, target, pitch, hold, reference=found[-1] if found else None))
+        require_clear(boom, found[-1], target if isinstance(target, str) else f"target {len(found)}")
+    places = [found[0], *(b for a, b in pairwise(found) if not np.array_equal(a, b))]
+    if not stops and len(places) > 2:
+        return [through(boom, np.array(places))], ()
+    paths: list[Path] = []
+    notes: list[str] = []
+    for a, b in pairwise(places):
+        way = detour(boom, a, b)
+        paths += [JointLine(*pair) for pair in pairwise(way)]
+        notes += [f"led round what the arm must keep away from, with a stop at {_shown(q)}" for q in way[1:-1]]
+    return paths, tuple(notes)
+
+
+def _tip_paths(
+    boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, along: Along, reference: ArrayLike | None
+) -> list[Path]:
+    if isinstance(along, str) and along != "line":
+        raise InputError(f"along is {along!r}; it must be 'joint', 'line' or a point of an arc")
+    if not isinstance(along, str) and len(targets) != 2:
+        raise InputError("an arc goes from one tip target to another, with no stop on the way")
+    if pitch is None:
+        raise InputError("a line or an arc of the tip goes at constant pitch, which must be given")
+    paths: list[Path] = []
+    last = reference
+    for a, b in pairwise([_place(target) for target in targets]):
+        if np.array_equal(a, b):
+            continue
+        curve = TipLine(a, b) if isinstance(along, str) else TipArc.through(a, along, b)
+        path = follow(boom, curve, pitch, hold, reference=last)
+        paths.append(path)
+        last = path(1.0)
+    return paths
+
+
+def _place(target: Target) -> Array:
+    if not isinstance(target, TipTarget):
+        raise InputError(f"{target!r} is no tip target; a line or an arc of the tip goes between tip targets")
+    return checked("tip target", target.position)
+
+
+def _shown(q: Array) -> str:
+    values = [f"{q[i]:.3f} m" if name == "extension" else f"{np.degrees(q[i]):.1f} deg" for i, name in enumerate(JOINTS)]
+    return ", ".join(f"{name} {value}" for name, value in zip(JOINTS, values, strict=True))

@@ -1,0 +1,64 @@
+"""Several reports beside each other, check by check."""
+
+from collections.abc import Mapping, Sequence
+
+from boom_model import JOINTS, InputError
+from planner.checks.rows import Row
+from planner.reports.markdown import section, table
+from planner.reports.report import Report, cells
+
+_BESIDES = ("mount", "tip")
+_DRIVE_CHECKS = ("gearbox", "motor", "actuator", "drive", "power-off")
+
+
+def compared(reports: Mapping[str, Report], joints: Sequence[str]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows for people: the drive checks of some joints, two columns a report.
+
+    Args:
+        reports: by name, in order.
+        joints: whose rows; "tip" and "mount" have some too. None given means every joint's.
+
+    Raises:
+        InputError: no such joint.
+    """
+    for joint in joints:
+        if joint not in (*JOINTS, *_BESIDES):
+            raise InputError(f"unknown joint {joint!r}; there are: {', '.join((*JOINTS, *_BESIDES))}")
+    by_check: dict[tuple[str, str], dict[str, Row]] = {}
+    for name, report in reports.items():
+        for row in report.rows:
+            if not joints or row.joint in joints:
+                by_check.setdefault((row.joint, row.check), {})[name] = row
+    header = ("joint", "check", *(text for name in reports for text in (f"{name}: demand of limit", "margin, verdict")))
+    rows = []
+    for (joint, check), found in by_check.items():
+        if joint in _BESIDES or check.startswith(_DRIVE_CHECKS):
+            rows.append((joint, check, *(text for name in reports for text in _pair(found.get(name)))))
+    return header, rows
+
+
+def comparison_markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """The table of `compared` as Markdown."""
+    return "\n".join(table(header, rows)) + "\n"
+
+
+def side_by_side_markdown(reports: Mapping[str, Report], joints: Sequence[str]) -> str:
+    """Several reports as one in Markdown: their summaries, the table of `compared`, notes of each, what is assumed.
+
+    Raises:
+        InputError: as `compared`.
+    """
+    lines = ["# " + ", ".join(reports), "", *(f"- {name}: {report.summary}" for name, report in reports.items()), ""]
+    lines += table(*compared(reports, joints))
+    for name, report in reports.items():
+        lines += section(f"Notes on {name}", report.notes)
+    lines += section("Assumed", list(dict.fromkeys(text for report in reports.values() for text in report.assumptions)))
+    return "\n".join(lines) + "\n"
+
+
+def _pair(row: Row | None) -> tuple[str, str]:
+    if row is None:
+        return "-", "-"
+    _, _, demand, limit, margin, *_ = cells(row)
+    asked = demand if limit == "-" else f"{demand} of {limit}"
+    return asked, row.verdict if margin == "-" else f"{margin}, {row.verdict}"

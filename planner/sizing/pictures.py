@@ -1,0 +1,59 @@
+"""The choice of drives as pictures: what each drive weighs and what it has to spare."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from planner.sizing.choice import Choice, room
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MARKS = "osD^vPX*"
+_COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Okabe and Ito's, which the colour-blind can tell apart: one a drive."""
+
+_SHOWN = (-0.5, 3.0)
+"""Rooms beyond are drawn at the edge."""
+
+
+def sizing_pictures(choices: Sequence[Choice]) -> dict[str, "Figure"]:
+    """A figure with a panel for each joint: drives by mass and by the least room beyond the required margin, by title.
+
+    A drive without a mass on its sheet, and one for which no motion was found, has no place in it.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    joints = list(dict.fromkeys(choice.joint for choice in choices if choice.judged))
+    variants = list(dict.fromkeys(choice.variant for choice in choices))
+    names = list(dict.fromkeys(judged.name for choice in choices for judged in choice.judged))
+    if not joints:
+        return {}
+    columns = min(len(joints), 3)
+    figure = Figure(figsize=(12.0, 6.5 if len(joints) <= 3 else 7.8), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(-(-len(joints) // columns), columns, squeeze=False).ravel()
+    for joint, axes in zip(joints, panels, strict=False):
+        axes.axhline(0.0, color="black", linewidth=0.8)
+        for choice in choices:
+            mark = _MARKS[variants.index(choice.variant) % len(_MARKS)]
+            for judged in choice.judged if choice.joint == joint else ():
+                tightest = judged.tightest()
+                if judged.mass is None or tightest is None:
+                    continue
+                spare = 100.0 * min(max(room(tightest), _SHOWN[0]), _SHOWN[1])
+                color = _COLORS[names.index(judged.name) % len(_COLORS)]
+                axes.plot(judged.mass, spare, mark, color=color, fillstyle="none" if judged.fails else "full", markersize=6)
+        axes.set(title=joint, xlabel="mass of the drive [kg]", ylabel="least room beyond what is required [%]")
+        axes.margins(x=0.15)
+        axes.grid(alpha=0.3, linewidth=0.5)
+    for axes in panels[len(joints) :]:
+        axes.axis("off")
+    key = panels[0]
+    for k, name in enumerate(names):
+        key.plot([], [], "s", color=_COLORS[k % len(_COLORS)], label=name)
+    for k, variant in enumerate(variants):
+        key.plot([], [], _MARKS[k % len(_MARKS)], color="grey", label=f"boom: {variant}")
+    key.plot([], [], "o", color="grey", fillstyle="none", label="hollow: FAIL")
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
+    return {"Drives by mass and room": figure}

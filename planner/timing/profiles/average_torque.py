@@ -1,0 +1,98 @@
+"""The time-optimal law within the gearboxes' average torque as well."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from boom_model import JOINTS, BaseMotion, Boom, Drive, inverse_dynamics
+from boom_model.arrays import Array
+from planner.checks.motion_checks import average_torque
+from planner.paths.path import Path
+from planner.timing.path_limits import InfeasiblePathError, path_dynamics
+from planner.timing.profiles.time_optimal import GRID_INTERVALS, time_optimal
+from planner.timing.time_law import Motion, TimeLaw
+
+_STEPS = 12
+_SLOWEST = 1e3
+_EACH = 3
+
+
+def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+    """The fastest law found whose average torque no gearbox's sheet forbids.
+
+    Along a path the average, (int |tau|^3 |p'| ds / int |p'| ds)^(1/3), depends on the whole motion, which toppra cannot
+    take in. Two ways are searched by bisection, and the faster taken: a cap on the gearboxes' torque, between what holding the
+    load asks for and the unbounded law's peak, all joints' in proportion; and slowing that law evenly.
+
+    Raises:
+        InfeasiblePathError: as `time_optimal`, or the average of the held load alone is beyond the limit.
+    """
+    sharp = time_optimal(boom, path, base)
+    limits = np.array([(drive and drive.gearbox.max_average_torque) or np.inf for drive in boom.drives])
+
+    def over(law: TimeLaw) -> bool:
+        return bool((_averages(boom, path, law, base) > limits).any())
+
+    if not over(sharp):
+        return sharp
+    slowest = sharp.stretched(_SLOWEST)
+    if over(slowest):
+        raise _held_too_much(boom, path, slowest, limits, base)
+    quick, slow = 1.0, _SLOWEST
+    for _ in range(2 * _STEPS):
+        middle = np.sqrt(quick * slow)
+        quick, slow = (middle, slow) if over(sharp.stretched(middle)) else (quick, middle)
+    even = sharp.stretched(slow)
+    best, solves = even, sharp.iterations
+    floor = np.abs(path_dynamics(boom, path, np.linspace(0.0, 1.0, GRID_INTERVALS + 1), base).c).max(axis=0)
+    peak = np.abs(_torque(boom, Motion(path, sharp), base)[2]).max(axis=0)
+    low, high = 0.0, 1.0
+    for _ in range(_STEPS):
+        share = (low + high) / 2.0
+        try:
+            capped = time_optimal(_capped(boom, floor + share * (peak - floor)), path, base)
+        except InfeasiblePathError:
+            low = share
+            continue
+        solves += capped.iterations
+        low, high = (low, share) if over(capped) else (share, high)
+        if not over(capped) and capped.duration < best.duration:
+            best = capped
+    return replace(best, iterations=solves, residual=max(best.residual, high - low if best is not even else 0.0))
+
+
+def _torque(boom: Boom, motion: Motion, base: BaseMotion | None) -> tuple[Array, Array, Array]:
+    """Times, joint velocities and torques of a motion."""
+    t = motion.law.times(_EACH)
+    q, qd, qdd, _ = motion(t)
+    return t, qd, inverse_dynamics(boom, q, qd, qdd, base=base, friction=True, reactions=False).tau
+
+
+def _averages(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None) -> Array:
+    t, qd, tau = _torque(boom, Motion(path, law), base)
+    return np.array([average_torque(t, tau[:, i], qd[:, i]) or 0.0 for i in range(5)])
+
+
+def _capped(boom: Boom, caps: Array) -> Boom:
+    """The boom with gearboxes that bear no more than `caps` (5,)."""
+    drives: list[Drive | None] = []
+    for drive, cap in zip(boom.drives, caps, strict=True):
+        limit = None if drive is None else drive.gearbox.start_stop_torque
+        if drive is None:
+            drives.append(None)
+        else:
+            bounded = float(cap) if limit is None else min(float(cap), limit)
+            drives.append(replace(drive, gearbox=replace(drive.gearbox, start_stop_torque=bounded)))
+    return replace(boom, drives=tuple(drives))
+
+
+def _held_too_much(boom: Boom, path: Path, slowest: TimeLaw, limits: Array, base: BaseMotion | None) -> InfeasiblePathError:
+    averages = _averages(boom, path, slowest, base)
+    worst = int(np.argmax(averages / limits))
+    t, _, tau = _torque(boom, Motion(path, slowest), base)
+    s = float(slowest.s(t[int(np.argmax(np.abs(tau[:, worst])))]))
+    return InfeasiblePathError(
+        f"no motion keeps the gearboxes' average torque: at {JOINTS[worst]} the load that is held alone averages "
+        f"{averages[worst]:.1f} Nm, and the sheet allows {limits[worst]:.1f} Nm",
+        JOINTS[worst], s, float(averages[worst]), float(limits[worst]),
+    )  # fmt: skip

@@ -1,0 +1,252 @@
+"""Time-optimal law along a path, by reachability analysis (toppra)."""
+
+import math
+from dataclasses import replace
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+import toppra
+from toppra.constraint import DiscretizationType, LinearConstraint
+from toppra.constraint.linear_constraint import canlinear_colloc_to_interpolate
+from toppra.interpolator import AbstractGeometricPath
+from toppra.solverwrapper.cy_seidel_solverwrapper import seidelWrapper
+
+from boom_model import BaseMotion, Boom
+from boom_model.arrays import Array
+from boom_model.drives.drive import drive_torque_tangent
+from planner.paths.path import Path
+from planner.timing.path_limits import (
+    PathDynamics,
+    explain_infeasible,
+    gear_limits,
+    jerk_stretch,
+    least_stretch,
+    motor_limits,
+    path_dynamics,
+    rotors,
+    static_limits,
+)
+from planner.timing.time_law import TimeLaw
+
+GRID_INTERVALS = 500
+_ROUGH_INTERVALS = 50  # of a first law, on which the tangents settle for a tenth of the price
+_SOLVES = 20
+_CONVERGED = 3e-4  # share of a limit that tangents at the law itself would add where it is met: the next solve gains less
+_MET = 1e-3
+_FINITE = 1e12
+_ROUNDING = 1e-8
+_TRIES = 10
+_NARROWEST = -2.5  # of the windows to average over: the power of ten, as a share of the duration
+_WINDOWS = 11
+_WINDOW_TOLERANCE = 1e-3
+
+_Rows = tuple[Array, Array, Array]
+
+
+def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, intervals: int = GRID_INTERVALS) -> TimeLaw:
+    """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
+
+    The path acceleration is constant over each of the `intervals` equal steps in s, and the conditions hold at both ends of
+    each step (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step.
+
+    A drive's limit falls with its speed and viscous friction grows with it; toppra holds only what is linear in u and x. Both
+    are therefore replaced by their tangents, which never allow more than the true ones: taken at low speed first, then at the
+    speeds of the solve before, until that adds nothing where a limit is met. Every solve keeps the true limits. The tangents
+    settle on a rough grid, from which the full one starts.
+
+    Raises:
+        InfeasiblePathError: no law keeps the limits, or a drive could not stop and hold its load somewhere;
+            names the joint, the place, the demand and the limit.
+    """
+    s = np.linspace(0.0, 1.0, intervals + 1)
+    demands = path_dynamics(boom, path, s, base)
+    if (demands.static_ratio > 1.0).any():  # a swing might carry the load past such a place, but could not stop at it
+        raise explain_infeasible(demands)
+    unit = _time_scale(demands)
+    few = np.unique(np.linspace(0, intervals, min(intervals, _ROUGH_INTERVALS) + 1).astype(int))
+    rough, found = _iterate(demands.at(few), path, np.zeros(len(few)), unit), None
+    if rough is not None:
+        unit = float(_durations(s[few], rough.speed).sum())
+        found = _iterate(demands, path, np.interp(s, s[few], rough.speed**2), unit)
+    if found is None:
+        found = _iterate(demands, path, np.zeros_like(s), unit)
+    if found is None:
+        raise explain_infeasible(demands)
+    acceleration = np.diff(found.speed**2) / (2.0 * np.diff(s))
+    law = TimeLaw.from_pieces(_durations(s, found.speed), [acceleration / 2.0, found.speed[:-1], s[:-1]])
+    return replace(law, iterations=found.solves, residual=found.gain)
+
+
+class _Found(NamedTuple):
+    """What the solves on one grid came to."""
+
+    speed: Array
+    """(n,) s'"""
+    solves: int
+    gain: float
+    """see `_gain`"""
+
+
+def _durations(s: Array, speed: Array) -> Array:
+    durations: Array = 2.0 * np.diff(s) / (speed[:-1] + speed[1:])
+    return durations
+
+
+def _time_scale(demands: PathDynamics) -> float:
+    """[s] of the order of the least duration: the solver wants units in which s' and s'' are of order one."""
+    boom = demands.boom
+    pushed = np.abs(demands.p1) / boom.limits.acceleration, np.abs(demands.a) / static_limits(boom)
+    return float(np.sqrt(max((1.0 / demands.x_max).max(), *(part.max() for part in pushed))))
+
+
+def _iterate(demands: PathDynamics, path: Path, x: Array, unit: float) -> _Found | None:
+    """The law of the last solve, the first with tangents at x (n,); None where there is none."""
+    found, rows = None, _rows(demands, x)
+    for solves in range(1, _SOLVES + 1):
+        solved = _solve(_Condition(_breakable(rows, demands), demands.x_max, unit), path, demands.s)
+        if solved is None:
+            break
+        speed = solved / unit
+        old, rows = rows, _rows(demands, speed**2)
+        found = _Found(speed, solves, _gain(demands.s, speed, old, rows))
+        if found.gain <= _CONVERGED:
+            break
+    return found
+
+
+def _gain(s: Array, speed: Array, old: _Rows, new: _Rows) -> float:
+    """How much more of a limit the new rows allow at a law's x, at most, where the law meets the old ones."""
+    a, b, c = old
+    x = speed[:, None] ** 2
+    u = np.diff(x, axis=0) / (2.0 * np.diff(s)[:, None])
+    before, after = a * np.concatenate([u[:1], u]), a * np.concatenate([u, u[-1:]])
+    met = np.maximum(before, after) + b * x + c > 1.0 - _MET
+    return float(np.max((b - new[1]) * x + c - new[2], where=met, initial=0.0))
+
+
+def _breakable(rows: _Rows, demands: PathDynamics) -> _Rows:
+    """The rows that some u and x within the joints' own limits would break: few are, and each costs time."""
+    a, b, c = rows
+    x = np.minimum(demands.x_max, _FINITE)
+    with np.errstate(divide="ignore"):
+        u = (demands.boom.limits.acceleration + np.abs(demands.p2) * x[:, None]) / np.abs(demands.p1)
+    fastest = np.minimum(u.min(axis=1), _FINITE)[:, None]
+    kept = (np.abs(a) * fastest + np.maximum(b * x[:, None], 0.0) + c > 1.0 - _ROUNDING).any(axis=0)
+    return a[:, kept], b[:, kept], c[:, kept]
+
+
+def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None) -> TimeLaw:
+    """A law averaged over a window and slowed until it keeps the joints' jerk limits besides their others.
+
+    Averaging s(t) neither leaves the path nor starts or ends in motion, makes the acceleration continuous and 0 at both ends,
+    and bounds the jerk by the jump of the acceleration over the window. What it shifts past a limit an even slowing mends; the
+    window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
+    makes the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is not the optimum.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def smooth(exponent: float) -> TimeLaw:
+        smoothed = law.averaged(law.duration * 10.0**exponent)
+        return smoothed.stretched(max(1.0, jerk_stretch(boom, path, smoothed), least_stretch(boom, path, smoothed, base)))
+
+    exponents = np.linspace(_NARROWEST, 0.0, _WINDOWS)
+    least = int(np.argmin([smooth(exponent).duration for exponent in exponents]))
+    around = exponents[max(least - 1, 0)], exponents[min(least + 1, _WINDOWS - 1)]
+    found = minimize_scalar(lambda x: smooth(x).duration, bounds=around, method="bounded", options={"xatol": _WINDOW_TOLERANCE})
+    return min(smooth(float(found.x)), smooth(float(exponents[least])), key=lambda each: each.duration)
+
+
+def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
+    """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,)."""
+    boom, zero = demands.boom, np.zeros_like(demands.s)
+    at_rest, gears, inertias = motor_limits(boom, np.zeros(5)), gear_limits(boom), rotors(boom)
+    intercepts, slopes = demands.friction_tangent(x)
+    columns = []
+    for i, drive in enumerate(boom.drives):
+        p1, p2, limit = demands.p1[:, i], demands.p2[:, i], boom.limits.acceleration[i]
+        for sign in (1.0, -1.0):
+            columns.append((sign * p1 / limit, sign * p2 / limit, zero))
+        if drive is None:
+            continue
+        tangent = drive_torque_tangent(drive, p1 * np.sqrt(x))
+        torques = [(demands.b[:, i], demands.c[:, i])]
+        if intercepts[:, i].any():  # without friction as well: it earns no credit while braking
+            torques.append((demands.b[:, i] + slopes[:, i], demands.c[:, i] + intercepts[:, i]))
+        for sign, (carried, held) in product((1.0, -1.0), torques):
+            a, b, c = sign * demands.a[:, i], sign * carried, sign * held
+            if np.isfinite(gears[i]):
+                columns.append((a / gears[i], b / gears[i], c / gears[i]))
+            if np.isfinite(at_rest[i]):
+                a, b = a + sign * inertias[i] * p1, b + sign * inertias[i] * p2
+                columns.append((a / at_rest[i], b / at_rest[i], c / at_rest[i]))
+                if tangent is not None:
+                    intercept, slope = tangent[0], tangent[1] * p1**2
+                    columns.append((a / at_rest[i], (b - slope) / at_rest[i], (c - intercept) / at_rest[i] + 1.0))
+    a, b, c = (np.stack(part, axis=-1) for part in zip(*columns, strict=True))
+    return a, b, c
+
+
+def _solve(condition: "_Condition", path: Path, s: Array) -> Array | None:
+    """s' at the grid points, in the condition's unit of time, by reachability analysis; None where there is none.
+
+    Backwards from rest the largest x from which rest can be reached, then forwards as fast as these allow. toppra's own loop
+    also asks for the least such x; here it is 0, because the load can be held at rest everywhere.
+    """
+    solver = seidelWrapper([condition], _ToppraPath(path), s)
+    step, top, x = solver.get_deltas(), np.zeros_like(s), np.zeros_like(s)
+    highest = np.array([1e-9, -1.0])
+    for i in range(len(step) - 1, -1, -1):
+        top[i] = solver.solve_stagewise_optim(i, None, highest, np.nan, np.nan, 0.0, top[i + 1])[1]
+        if math.isnan(top[i]):
+            return None
+    for i in range(len(step)):
+        onwards = np.array([-2.0 * step[i], -1.0])
+        for _ in range(_TRIES):  # rounding may put x a little above what can be reached from
+            u = solver.solve_stagewise_optim(i, None, onwards, x[i], x[i], 0.0, top[i + 1])[0]
+            if not math.isnan(u):
+                break
+            x[i] *= 1.0 - 1e-3
+        else:
+            return None
+        reached = x[i] + 2.0 * step[i] * u
+        x[i + 1] = min(top[i + 1], max(reached - _ROUNDING, reached * (1.0 - 1e-4), 0.0))
+    return np.sqrt(x)
+
+
+class _Condition(LinearConstraint):  # type: ignore[misc]
+    """Rows a u + b x + c <= 1 in toppra's form, with time in units of `unit` seconds."""
+
+    def __init__(self, rows: tuple[Array, Array, Array], x_max: Array, unit: float) -> None:
+        super().__init__()
+        self.set_discretization_type(DiscretizationType.Interpolation)
+        self.identical = True
+        self._rows, self._x_max, self._square = rows, x_max, unit**2
+
+    def compute_constraint_params(self, path: AbstractGeometricPath, gridpoints: Array, *_: object) -> Any:
+        a, b, c = self._rows
+        x_max = np.minimum(self._x_max * self._square, toppra.constants.MAXX)
+        x_bound = np.stack([np.zeros_like(x_max), x_max], axis=-1)
+        F, g = np.eye(a.shape[1]), np.ones(a.shape[1])
+        # The helper hands its sixth and seventh argument back in their places: the bounds on u and on x.
+        return canlinear_colloc_to_interpolate(
+            a / self._square, b / self._square, c, F, g, None, x_bound, gridpoints, identical=True
+        )
+
+
+class _ToppraPath(AbstractGeometricPath):  # type: ignore[misc]
+    """toppra's view of a path; the conditions above have been evaluated already."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __call__(self, path_positions: Array, order: int = 0) -> Array:
+        return self._path(path_positions, order)
+
+    @property
+    def dof(self) -> int:
+        return 5
+
+    @property
+    def path_interval(self) -> Array:
+        return np.array([0.0, 1.0])

@@ -1,0 +1,142 @@
+"""How a path is travelled in time: s(t), and the motion that it gives."""
+
+from dataclasses import dataclass, replace
+from math import comb, factorial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model.arrays import Array
+from planner.paths.path import Path
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PPoly
+
+_BESIDE = 1e-9  # relative; so near to a knot of the path that it stands for its side
+_LEFT_OF = 1e-12  # relative; so near to a piece's end that it stands for the end itself
+
+
+@dataclass(frozen=True, eq=False)
+class TimeLaw:
+    """s(t) from 0 to 1, a piecewise polynomial from rest to rest."""
+
+    s: "PPoly"
+    jerk_limited: bool = False
+    """Whether the acceleration is continuous and the jerk was held to a limit."""
+    iterations: int = 1
+    """Solves, of a law that is found by solving again."""
+    residual: float = 0.0
+    """How far from converged: what one more solve could still add, as a share of a limit."""
+
+    @property
+    def duration(self) -> float:
+        return float(self.s.x[-1])
+
+    def stretched(self, factor: float) -> "TimeLaw":
+        """The same law, slower by `factor`: s(t / factor)."""
+        powers = np.arange(len(self.s.c) - 1, -1, -1.0)[:, None]
+        return replace(self, s=type(self.s)(self.s.c / factor**powers, self.s.x * factor))
+
+    def times(self, each: int) -> Array:
+        """`each` equal times in every piece, its own ends included: a jump between pieces is seen from both sides."""
+        start, length = self.s.x[:-1, None], np.diff(self.s.x)[:, None]
+        inside: Array = start + length * np.linspace(0.0, 1.0 - _LEFT_OF, each)
+        return np.append(inside.ravel(), self.duration)
+
+    def after(self, at: float) -> "TimeLaw":
+        """What is left of the law from a moment `at` within it."""
+        breaks = np.append(at, self.s.x[self.s.x > at])
+        return replace(self, s=type(self.s)(self.on(breaks), breaks - at))
+
+    def on(self, breaks: Array) -> Array:
+        """Coefficients (powers, pieces) of the same law between other breaks, which hold its own; at rest after its end."""
+        pieces = np.searchsorted(self.s.x, breaks[:-1], side="right") - 1
+        over = pieces >= len(self.s.x) - 1
+        pieces = np.where(over, 0, pieces)
+        coefficients = _moved(self.s.c[:, pieces], breaks[:-1] - self.s.x[pieces])
+        rest = np.zeros((len(coefficients), 1))
+        rest[-1] = self.s(self.duration)
+        return np.where(over, rest, coefficients)
+
+    def averaged(self, width: float) -> "TimeLaw":
+        """The law averaged over the last `width` seconds, (1/w) integral of s from t - w to t; `width` longer.
+
+        It travels the same path from rest to rest, and no faster. Its acceleration is continuous, from 0 to 0, and its jerk
+        at most the law's largest difference of accelerations over the width.
+        """
+        breaks = np.union1d(self.s.x, self.s.x + width)
+        kept = np.append(True, np.diff(breaks) > _LEFT_OF * breaks[-1])
+        breaks = breaks[kept]
+        middle, step = (breaks[:-1] + breaks[1:]) / 2.0, np.diff(breaks)
+        integral = self.s.antiderivative()
+        order = len(integral.c)
+        coefficients = np.zeros((order, len(step)))
+        for shift, sign in ((0.0, 1.0), (width, -1.0)):
+            at = middle - shift
+            inside = np.clip(at, 0.0, self.duration)
+            running = (at > 0.0) & (at < self.duration)
+            taylor = np.array([np.where(running, integral(inside, k), 0.0) / factorial(k) for k in range(order)])
+            after = at >= self.duration
+            taylor[0] += np.where(after, float(integral(self.duration)) + at - self.duration, 0.0)
+            taylor[1] += after
+            coefficients += sign / width * taylor[::-1]
+        pieces = _moved(coefficients, -step / 2.0)
+        return replace(self, s=type(self.s)(pieces, breaks), jerk_limited=True)
+
+    @staticmethod
+    def from_pieces(durations: ArrayLike, coefficients: ArrayLike, jerk_limited: bool = False) -> "TimeLaw":
+        """A law from the duration of each piece and its coefficients, highest power first, shape (powers, pieces).
+
+        Pieces of no duration are left out.
+        """
+        from scipy.interpolate import PPoly  # a third of a second, which `boom ik` does not need
+
+        durations, coefficients = np.asarray(durations, dtype=float), np.asarray(coefficients, dtype=float)
+        kept = durations > 0.0
+        breaks = np.concatenate([[0.0], np.cumsum(durations[kept])])
+        return TimeLaw(PPoly(coefficients[:, kept], breaks), jerk_limited)
+
+
+def _moved(coefficients: Array, by: Array) -> Array:
+    """Polynomials (powers, pieces), highest power first, with their origins moved by (pieces,)."""
+    order = len(coefficients)
+    moved = np.zeros_like(coefficients)
+    for power in range(order):
+        for low in range(power + 1):
+            moved[order - 1 - low] += coefficients[order - 1 - power] * comb(power, low) * by ** (power - low)
+    return moved
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A path travelled by a time law."""
+
+    path: Path
+    law: TimeLaw
+
+    @property
+    def duration(self) -> float:
+        return self.law.duration
+
+    def times(self, samples: int) -> Array:
+        """At least that many times, equal within each piece of the law, with both sides of every jump of law and path."""
+        t = self.law.times(max(3, -(-samples // (len(self.law.s.x) - 1))))
+        passed = [self.law.s.solve(knot, extrapolate=False) for knot in self.path.knots]
+        if not passed:
+            return t
+        at = np.concatenate(passed)
+        beside = np.concatenate([at - _BESIDE * self.duration, at + _BESIDE * self.duration])
+        return np.sort(np.concatenate([t, np.clip(beside[np.isfinite(beside)], 0.0, self.duration)]))
+
+    def __call__(self, t: ArrayLike) -> tuple[Array, Array, Array, Array]:
+        """q, qd, qdd and qddd at the times t, each (..., 5), by the chain rule; t outside the move is clipped to it.
+
+        qd = p' s',  qdd = p'' s'^2 + p' s'',  qddd = p''' s'^3 + 3 p'' s' s'' + p' s'''.
+        """
+        inside = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        s, v, a, j = (np.asarray(self.law.s(inside, order)) for order in range(4))
+        s = np.clip(s, 0.0, 1.0)
+        p = [self.path(s, order) for order in range(4)]
+        v, a, j = v[..., None], a[..., None], j[..., None]
+        return p[0], p[1] * v, p[2] * v**2 + p[1] * a, p[3] * v**3 + 3.0 * p[2] * v * a + p[1] * j
