@@ -58,7 +58,7 @@ def write_control_recording(path: str | Path, study: Study, *, step: float = 0.0
         for bundle in (*errors, *(bundle for tab in tabs.values() for bundle in tab)):
             bundle.log(recording, t)
         for name, content in pictures.items():
-            log_png(recording, f"demos/pictures/{name}", content)
+            log_png(recording, f"pictures/{name}", content)
 
     save(path, f"{boom.name}: closed loop", log)
 
