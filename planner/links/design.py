@@ -35,6 +35,7 @@ from boom_model.link_design.beam import Forces
 from boom_model.link_design.exact import buckling_load, pressed
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
+from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Verdict
 from planner.links.loads import largest_components, link_cases, thesis_load
 from planner.motion.trajectory import Trajectory
@@ -423,6 +424,9 @@ def _stress_check(beam: Beam, H: Array, cases: LoadCases, stresses: Array) -> St
     return StressCheck(float(x), found.elements, float(found.stress[at]), float(own[0, 0]))
 
 
+_MOTOR_TORQUES = (CheckKind.MOTOR_TORQUE, CheckKind.MOTOR_TORQUE_REVERSED, CheckKind.MOTOR_TORQUE_QUASI_STATIC)
+
+
 def _motors(
     before: Boom,
     after: Boom,
@@ -437,15 +441,14 @@ def _motors(
         return []
 
     def judged(boom: Boom, motor: Drive) -> tuple[Verdict, float | None]:
-        drives = tuple(motor if i == joint else d for i, d in enumerate(boom.drives))
         rows = [
             row
             for t in trajectories
-            for row in check(replace(boom, drives=drives), t, payload_as=payload_as).rows
-            if row.joint == JOINTS[joint] and row.check.startswith("motor")
+            for row in check(boom.with_drive(JOINTS[joint], motor), t, payload_as=payload_as).rows
+            if row.joint == JOINTS[joint] and row.kind.part is Part.MOTOR
         ]
         order = [Verdict.INFO, Verdict.PASS, Verdict.WARN, Verdict.NOT_CHECKABLE, Verdict.FAIL]
-        margins = [r.margin for r in rows if r.margin is not None and "torque" in r.check and r.verdict is not Verdict.INFO]
+        margins = [row.margin for row in rows if row.margin is not None and row.kind in _MOTOR_TORQUES]
         return max((row.verdict for row in rows), key=order.index), min(margins, default=None)
 
     choices = []
