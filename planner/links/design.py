@@ -39,7 +39,8 @@ from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Verdict
 from planner.links.loads import largest_components, link_cases, thesis_load
 from planner.motion.trajectory import Trajectory
-from planner.planning import check, plan, plan_each_profile
+from planner.move_spec import MoveSpec
+from planner.planning import check, plan_each_profile, plan_motion
 from planner.progress import Track
 
 E = TypeVar("E", bound=StrEnum)
@@ -324,7 +325,8 @@ def default_moves(boom: Boom, task: LinkTask, track: Track = iter) -> list[Traje
         InputError, InfeasibleError: as `plan`.
     """
     if task.load == LoadFrom.THESIS:
-        return [plan(boom, "transport", "phenotyping", duration=5.0).trajectory]
+        thesis_move = plan_motion(boom, MoveSpec.of("transport", "phenotyping", duration=5.0))
+        return [replace(thesis_move.trajectory, planned=None)]
     return plan_each_profile(boom, "transport", "phenotyping", track)
 
 
