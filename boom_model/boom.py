@@ -22,6 +22,9 @@ JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
 IS_LENGTH = read_only([0, 0, 0, 1, 0]).astype(bool)
 """True where a joint coordinate is a length [m] and not an angle [rad]."""
 
+LOAD_UNITS = tuple("N" if length else "Nm" for length in IS_LENGTH)
+"""Unit of each joint's torque; the extension's is a force."""
+
 MOVING_BODIES = ("lower", "inner", "outer", "upper", "extension", "end_effector")
 """Bodies that move against the yawing base; the payload moves with the end effector."""
 
@@ -121,6 +124,12 @@ class Friction:
     origins: tuple[Origin | None, ...]
     """Of each joint's pair; None where none is given."""
 
+    def torque(self, qd: ArrayLike) -> Array:
+        """Torque [Nm, the extension's N] that overcomes friction at joint velocities qd (..., 5), of the same shape."""
+        qd = np.asarray(qd, dtype=float)
+        torque: Array = self.viscous * qd + self.coulomb * np.sign(qd)
+        return torque
+
 
 @dataclass(frozen=True)
 class Mount:
@@ -199,6 +208,23 @@ class Boom:
             )
         changed = Body(mass, old.com, read_only(old.inertia * (mass / old.mass)))
         return replace(self, bodies=MappingProxyType({**self.bodies, name: changed}))
+
+    def with_drive(self, joint: str, drive: Drive | LinearDrive | None) -> "Boom":
+        """The same boom with another drive on a joint; the mass of the bodies stays as it is.
+
+        Args:
+            drive: a linear drive replaces the boom's actuator; None leaves the joint without a drive.
+
+        Raises:
+            InputError: no such joint, or a linear drive on a joint that turns.
+        """
+        if joint not in JOINTS:
+            raise InputError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
+        if isinstance(drive, LinearDrive):
+            if not IS_LENGTH[JOINTS.index(joint)]:
+                raise InputError(f"{joint} turns; a linear actuator drives the extension only")
+            return replace(self, actuator=drive)
+        return replace(self, drives=tuple(drive if name == joint else d for name, d in zip(JOINTS, self.drives, strict=True)))
 
     def pose(self, name: str) -> Array:
         """The named pose, (5,).

@@ -7,14 +7,15 @@ the time-optimal profile knows where on the path there is torque to spare, and a
 """
 
 from boom_model import Boom
+from planner import MoveSpec
 from planner.profile_table import HEADER, cells, profile_table
 
 
 def main() -> None:
-    boom = Boom.load()
+    boom, move = Boom.load(), MoveSpec.of("transport", "phenotyping")
     for payload in (10.0, 20.0):
         print(f"transport to phenotyping with {payload:g} kg")
-        rows = [HEADER, *(cells(row) for row in profile_table(boom.with_payload(payload), "transport", "phenotyping"))]
+        rows = [HEADER, *(cells(row) for row in profile_table(boom.with_payload(payload), move))]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         for row in rows:
             print("  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)))

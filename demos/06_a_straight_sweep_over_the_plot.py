@@ -9,7 +9,7 @@ reach says where.
 import sys
 
 from boom_model import Boom, InfeasibleError
-from planner import TipTarget, parse_hold, plan
+from planner import TipTarget, plan
 from planner.recording import write_recording
 
 START, GOAL = TipTarget((1.0, 1.7, 0.9)), TipTarget((-1.0, 1.7, 0.9))
@@ -18,7 +18,7 @@ START, GOAL = TipTarget((1.0, 1.7, 0.9)), TipTarget((-1.0, 1.7, 0.9))
 def main(out: str = "sweep.rrd") -> None:
     boom = Boom.load()
     for hold in ("horizontal", "least-extension", "least-torque"):
-        move = plan(boom, START, GOAL, along="line", hold=parse_hold(hold), profile="jerk-limited")
+        move = plan(boom, START, GOAL, along="line", constraint=hold, profile="jerk-limited")
         peaks = ", ".join(f"{peak.joint} {peak.total:.0f} {peak.unit}" for peak in move.report.peaks[:3])
         print(f"hold {hold}: {move.report.duration:.2f} s, {move.report.notes[0]}; largest torques {peaks}")
     write_recording(out, move)

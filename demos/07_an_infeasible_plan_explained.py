@@ -7,20 +7,21 @@ single changes that work; each has been planned again before it is offered.
 """
 
 from boom_model import Boom, InfeasibleError
-from planner import plan
-from planner.suggestions import remedies
+from planner import MoveSpec, plan_move
+from planner.suggestions import suggestions
 
 
 def main() -> None:
     heavy = Boom.load().with_payload(30.0)
     for options in ({"profile": "time-optimal"}, {"duration": 3.0}):
         boom = heavy if "profile" in options else Boom.load()
+        move = MoveSpec.of("transport", "phenotyping", **options)
         try:
-            plan(boom, "transport", "phenotyping", **options)
+            plan_move(boom, move)
         except InfeasibleError as error:
             print(error)
-        for remedy in remedies(boom, "transport", "phenotyping", **options):
-            print(f"  would mend it: {remedy.sentence}")
+        for suggestion in suggestions(boom, move):
+            print(f"  would mend it: {suggestion.sentence}")
 
 
 if __name__ == "__main__":

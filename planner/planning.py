@@ -2,62 +2,149 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import (
-    ActuatorHorizontal,
-    BaseMotion,
-    Boom,
-    Breakdown,
-    InputError,
-    Loads,
-    breakdown,
-    inverse_dynamics,
-    up_on_slope,
-)
-from boom_model.arrays import Array, checked
+from boom_model import JOINTS, Boom, Breakdown, Loads, breakdown
+from boom_model.arrays import Array
+from boom_model.boom import LOAD_UNITS
+from boom_model.drives.drive import drive_torque_limit
 from boom_model.dynamics.newton_euler import PayloadAs
-from boom_model.kinematics.constraints import Hold
-from planner.checks.certificate import certify
+from boom_model.kinematics.constraints import Hold as Constraint
+from planner.checks.certificate import certified
 from planner.checks.drives.duty import Duty
-from planner.checks.drives.joint_view import Shock
+from planner.checks.evaluation import Evaluation, at_samples, evaluate
 from planner.checks.motion_checks import check_rows
-from planner.checks.stopping import worst_stop
-from planner.motion.trajectory import STEP, Trajectory, at_rest, check_size, joined, sample
-from planner.motion.vehicle import VehicleCase, base_motion
-from planner.paths.legs import Along, legs
+from planner.checks.stopping import WorstStop, worst_stop
+from planner.motion.planned import PlannedMotion
+from planner.motion.trajectory import STEP, Trajectory, motion_table
+from planner.motion.vehicle import LEVEL, VehicleCase, load_case
+from planner.move_spec import MoveSpec
+from planner.paths.legs import legs
 from planner.paths.targets import Target, resolve
 from planner.progress import Track
-from planner.reports.report import Report, assumptions, torque_peaks
+from planner.reports.report import Report, TorquePeak, assumptions, torque_peaks
+from planner.timing.profile import PROFILES, TimingProfile
 from planner.timing.time_law import Motion
-from planner.timing.timing import Profile, Timing, timed
+from planner.timing.timing import timed
 
-CHECKS_PER_STEP = 10
-"""A planned move is checked on a grid this many times finer than it is sampled."""
+if TYPE_CHECKING:
+    import pyarrow as pa
+    from matplotlib.figure import Figure
 
 _ROUNDING = 1e-9
 
-SHOCK_SAMPLES = 20
-"""Samples that a shock must have for its peak to be seen, to 0.3 %."""
 
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Move:
-    """A move, its loads, and what the checks say of it."""
+    """A motion and its report. What the report does not need is evaluated when it is asked for."""
 
-    boom: Boom
     profile: str
-    """A `Profile`, or what a motion from elsewhere is called."""
+    """The profile's name, or what a motion from elsewhere is called."""
     trajectory: Trajectory
-    loads: Loads
-    parts: Breakdown
-    """The torques' breakdown, friction included."""
+    """The samples. Those of a plan know the continuous motion that they were taken from."""
+    evaluation: Evaluation
+    """What the report was made from: a plan on its fine grid, a motion from elsewhere at its samples."""
     report: Report
-    motions: tuple[Motion, ...]
-    """The continuous motions behind a plan's samples, from stop to stop; none of an empty move or a motion from elsewhere."""
-    vehicle: VehicleCase | None = None
+    """Without the stop analysis; see `full_report`."""
+
+    @property
+    def boom(self) -> Boom:
+        return self.evaluation.boom
+
+    @property
+    def vehicle(self) -> VehicleCase:
+        return self.evaluation.vehicle
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The continuous motions behind a plan's samples, from stop to stop; none of an empty move or other motions."""
+        planned = self.evaluation.planned
+        return () if planned is None else planned.motions
+
+    @cached_property
+    def sampled(self) -> Evaluation:
+        """The evaluation at the trajectory's samples, for what is shown or written at them."""
+        evaluation = self.evaluation
+        if evaluation.trajectory is self.trajectory:
+            return evaluation
+        return at_samples(self.boom, self.trajectory, vehicle=self.vehicle, payload_as=evaluation.payload_as)
+
+    @property
+    def loads(self) -> Loads:
+        """Joint torques, pin forces and mount wrench at the samples."""
+        return self.sampled.loads
+
+    @cached_property
+    def parts(self) -> Breakdown:
+        """Parts of the torques at the samples, friction included."""
+        return _parts(self.sampled)
+
+    @cached_property
+    def stop(self) -> WorstStop | None:
+        """The longest and the farthest stop on the way of a plan; None of other motions."""
+        return worst_stop(self.boom, self.motions, self.vehicle.tilt) if self.motions else None
+
+    @cached_property
+    def full_report(self) -> Report:
+        """The report with the stop analysis, which takes longer than the rest of it."""
+        return replace(self.report, stop=self.stop)
+
+    def torque_limits(self) -> Array:
+        """Joint torque (n, 5) that each drive allows at the samples' speeds [Nm]; infinite where no limit is known.
+
+        See `drive_torque_limit`: it bounds the torque with the drive's own inertia added.
+        """
+        limits = np.full(self.trajectory.q.shape, np.inf)
+        for i, drive in enumerate(self.boom.drives):
+            limit = None if drive is None else drive_torque_limit(drive, self.trajectory.qd[:, i])
+            if limit is not None:
+                limits[:, i] = limit
+        return limits
+
+    def to_table(self) -> "pa.Table":
+        """The samples with their torques: t, q1..q5, qd1..qd5, qdd1..qdd5, tau1..tau5 in SI."""
+        return motion_table(self.trajectory, self.loads.tau)
+
+    def plot(self) -> "Figure":
+        """A figure of positions, speeds, accelerations and torques over time."""
+        from planner.reports.move_pictures import move_figure
+
+        return move_figure(self.boom, self.trajectory, self.loads.tau)
+
+    def record(self, path: str | Path) -> None:
+        """Writes the move as a Rerun recording; `boom view` or `rerun` shows it.
+
+        Raises:
+            InputError: the file cannot be written; an old one is left as it was.
+        """
+        from planner.recording import write_recording  # above this module in the order of rooms, and slow to import
+
+        write_recording(path, self)
+
+    def __repr__(self) -> str:
+        count = len(self.trajectory.t)
+        return f"Move({self.profile}, {self.report.duration:.3f} s, {count} samples, {self.report.verdict})"
+
+    def _repr_html_(self) -> str:
+        limits, tau = self.torque_limits(), self.loads.tau
+        rows = []
+        for i, joint in enumerate(JOINTS):
+            at = int(np.abs(tau[:, i]).argmax())
+            limit = limits[at, i]
+            allowed = "-" if np.isinf(limit) else f"{limit:.1f} {LOAD_UNITS[i]}"
+            verdict = self.report.verdict_of(joint)
+            cells = (joint, f"{tau[at, i]:.1f} {LOAD_UNITS[i]}", allowed, f"{self.trajectory.t[at]:.2f} s", verdict)
+            rows.append("".join(f"<td>{cell}</td>" for cell in cells))
+        header = "".join(f"<th>{name}</th>" for name in ("joint", "largest torque", "drive allows then", "at", "verdict"))
+        table = "".join(f"<tr>{row}</tr>" for row in rows)
+        return (
+            f"<p>{self.profile}, {self.report.duration:.3f} s: {self.report.summary}</p><table><tr>{header}</tr>{table}</table>"
+        )
 
 
 def plan(
@@ -65,39 +152,18 @@ def plan(
     start: Target,
     goal: Target,
     *,
-    profile: str = Profile.CUBIC,
-    duration: float | None = None,
-    pitch: float | None = -np.pi / 2.0,
-    hold: Hold | None = None,
+    profile: str | TimingProfile = "cubic",
+    constraint: str | Constraint = "horizontal",
+    pitch: str | float | None = "down",
     via: Sequence[Target] = (),
     stop_at_via: bool = True,
-    via_velocities: ArrayLike | None = None,
-    along: Along = "joint",
-    jerk_bound: bool = False,
-    average_torque: bool = False,
-    vehicle: VehicleCase | None = None,
-    step: float = STEP,
+    along: str | ArrayLike = "joint",
+    duration: float | None = None,
     rate: float | None = None,
+    vehicle: str | VehicleCase = LEVEL,
+    step: float = STEP,
 ) -> Move:
-    """A move from start to goal, rest to rest, checked on a grid finer than its samples.
-
-    Args:
-        start, goal: a pose's name, a joint position (5,) [rad, the extension in m], or a TipTarget.
-        profile: "cubic", "quintic", "trapezoidal", "jerk-limited" or "time-optimal".
-        duration: [s]; None is the least that the limits allow. A longer one slows the least-time motion evenly.
-        pitch, hold: for tip targets. No pitch lets the hold choose it, no hold holds the actuator horizontal.
-        via: targets on the way.
-        stop_at_via: whether the move stops at them; else it goes through them on a smooth path.
-        via_velocities: (k, 5) [rad/s, the extension's m/s] at the k targets on the way, of the cubic that goes through them
-            without a stop; None makes its acceleration continuous instead.
-        along: "joint" goes straight in joint space; "line" leads the tip straight from tip target to tip target at constant
-            pitch; a point (3,) [m] leads it along the arc of a circle through that point.
-        jerk_bound: holds the time-optimal profile to the jerk limits, with no acceleration at the ends.
-        average_torque: holds the time-optimal profile to the gearboxes' average torque.
-        vehicle: what the vehicle does during the move. The plan knows its slope; track and shock are in the checks alone.
-        step: longest sampling step [s].
-        rate: a controller's [Hz]: the samples are on its clock, and the move lasts a whole number of its periods, from stop
-            to stop. Takes the place of `step`.
+    """A move from start to goal, rest to rest, checked on a grid finer than its samples. `MoveSpec.of` has the arguments.
 
     Raises:
         InputError: an input is malformed or not finite.
@@ -105,36 +171,55 @@ def plan(
             away from is in the way, or no motion keeps the drives' limits.
 
     >>> move = plan(Boom.load(), "transport", "phenotyping", profile="time-optimal")
-    >>> round(move.report.duration, 3), str(move.report.verdict)
-    (4.333, 'INCOMPLETE')
+    >>> move
+    Move(time-optimal, 4.333 s, 435 samples, INCOMPLETE)
     """
-    if via_velocities is not None:
-        stop_at_via = False
-        via_velocities = checked("via_velocities", via_velocities, 5)
-    timing = Timing.of(profile, duration, jerk_bound, average_torque, via_velocities, rate)
-    step = step if rate is None else 1.0 / rate
-    if duration is not None:
-        check_size(duration, step)
-    hold = ActuatorHorizontal() if hold is None else hold
-    paths, notes = legs(boom, (start, *via, goal), pitch, hold, along, stop_at_via)
+    spec = MoveSpec.of(
+        start,
+        goal,
+        via=via,
+        stop_at_via=stop_at_via,
+        constraint=constraint,
+        pitch=pitch,
+        along=along,
+        profile=profile,
+        duration=duration,
+        rate=rate,
+        vehicle=vehicle,
+        step=step,
+    )
+    return plan_move(boom, spec)
+
+
+def plan_move(boom: Boom, spec: MoveSpec) -> Move:
+    """`plan` of a description."""
+    planned = plan_motion(boom, spec)
+    return _move(evaluate(boom, planned, vehicle=spec.vehicle), planned.trajectory, str(spec.profile))
+
+
+def plan_motion(boom: Boom, spec: MoveSpec, reference: ArrayLike | None = None) -> PlannedMotion:
+    """The motions of a move from stop to stop, without loads or checks.
+
+    Args:
+        reference: joint position (5,) that the start of a tip line or arc is nearest to; None is the middle of the ranges.
+
+    Raises:
+        InputError, InfeasibleError: as `plan`.
+    """
+    paths, notes = legs(boom, spec.targets, spec.pitch, spec.constraint, spec.along, spec.stop_at_via, reference)
     if not paths:
-        q = resolve(boom, start, pitch, hold)
+        q = resolve(boom, spec.start, spec.pitch, spec.constraint)
         note = "start and goal are the same joint position: an empty move, of no duration"
-        return _move(boom, timing.profile, vehicle, at_rest(q, (note,)), None, ())
-    tilt = None if vehicle is None else BaseMotion.of(up=up_on_slope(vehicle.roll, vehicle.pitch))
-    motions = timed(boom, paths, timing, tilt)
+        return PlannedMotion((), q, spec.step, (note,))
+    motions = timed(boom, paths, spec.timing, spec.vehicle.tilt)
     lasts = sum(motion.duration for motion in motions)
-    if rate is not None and duration is not None and lasts > duration * (1.0 + _ROUNDING):
-        notes = (*notes, f"lengthened from {duration:g} s to {lasts:g} s by the controller's clock")
-    finer = step / CHECKS_PER_STEP
-    if vehicle is not None and vehicle.peak != 0.0:
-        finer = min(finer, vehicle.shock_duration / (2 * SHOCK_SAMPLES))
-    coarse, fine = (joined([sample(motion, each) for motion in motions], notes) for each in (step, finer))
-    return _move(boom, timing.profile, vehicle, coarse, fine, motions, tilt, average_torque)
+    if spec.rate is not None and spec.duration is not None and lasts > spec.duration * (1.0 + _ROUNDING):
+        notes = (*notes, f"lengthened from {spec.duration:g} s to {lasts:g} s by the controller's clock")
+    return PlannedMotion(motions, motions[0].path(0.0), spec.step, notes, spec.profile.limits_average_torque)
 
 
 def plan_each_profile(boom: Boom, start: Target, goal: Target, track: Track = iter) -> list[Trajectory]:
-    """The move in the least time of each profile, as samples.
+    """The move in the least time of each profile, as samples alone.
 
     Args:
         track: iterates over the profiles, and may show how far it is.
@@ -142,7 +227,8 @@ def plan_each_profile(boom: Boom, start: Target, goal: Target, track: Track = it
     Raises:
         InputError, InfeasibleError: as `plan`.
     """
-    return [plan(boom, start, goal, profile=profile).trajectory for profile in track(list(Profile))]
+    specs = [MoveSpec.of(start, goal, profile=profile) for profile in PROFILES]
+    return [replace(plan_motion(boom, spec).trajectory, planned=None) for spec in track(specs)]
 
 
 def check(
@@ -150,15 +236,17 @@ def check(
     trajectory: Trajectory,
     *,
     payload_as: PayloadAs = "mass",
-    vehicle: VehicleCase | None = None,
+    vehicle: str | VehicleCase = LEVEL,
     profile: str = "recorded",
     duty: Duty | None = None,
 ) -> Report:
-    """The limit and drive checks of any motion, at its samples, with the joints' friction where it is known.
+    """The limit and drive checks of any motion, with the joints' friction where it is known.
+
+    A trajectory of a plan is checked between its samples too, so that its report is the plan's; any other at its samples.
 
     Args:
         payload_as: see `inverse_dynamics`.
-        vehicle: what the vehicle does meanwhile; None rests on level ground.
+        vehicle: what the vehicle does meanwhile.
         profile: what the report calls the motion.
         duty: the cycle that the samples stand for; None is the motion alone.
     """
@@ -170,107 +258,53 @@ def examine(
     trajectory: Trajectory,
     *,
     payload_as: PayloadAs = "mass",
-    vehicle: VehicleCase | None = None,
+    vehicle: str | VehicleCase = LEVEL,
     profile: str = "recorded",
     duty: Duty | None = None,
 ) -> Move:
     """Any motion with its loads and its checks, as `write_recording` takes it; for the arguments see `check`."""
-    loads, parts, base = _loads(boom, trajectory, vehicle, payload_as)
-    shock = None if vehicle is None or vehicle.peak == 0.0 else _shock(boom, trajectory, vehicle, payload_as)
-    report = Report(
-        profile=str(profile),
-        duration=trajectory.duration if duty is None else duty.duration,
-        rows=check_rows(
-            boom,
-            trajectory,
-            loads,
-            base=base,
-            payload_as=payload_as,
-            shock=shock,
-            bases=() if vehicle is None else (vehicle.origin.basis,),
-            duty=duty,
-        ),
-        notes=(*trajectory.notes, *_vehicle_notes(vehicle)),
-        assumptions=assumptions(boom, trajectory.qddd is not None),
-        peaks=torque_peaks(trajectory.t, parts),
-    )
-    return Move(boom, str(profile), trajectory, loads, parts, report, (), vehicle)
+    case = load_case(vehicle) if isinstance(vehicle, str) else vehicle
+    return _move(evaluate(boom, trajectory, vehicle=case, payload_as=payload_as), trajectory, str(profile), duty)
 
 
-def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None) -> Array:
-    """Joint torques (n, 5) of a motion, on level ground without a vehicle, with the joints' friction where it is known.
+def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", vehicle: VehicleCase = LEVEL) -> Array:
+    """Joint torques (n, 5) at a trajectory's samples, with the joints' friction where it is known.
 
     Raises:
         InputError: as `inverse_dynamics`, or a torque is not finite.
     """
-    base = None if vehicle is None else base_motion(vehicle, trajectory.t)
-    return _finite_loads(boom, trajectory, base, payload_as, reactions=False).tau
+    return at_samples(boom, trajectory, vehicle=vehicle, payload_as=payload_as, reactions=False).tau
 
 
-def _loads(
-    boom: Boom, trajectory: Trajectory, vehicle: VehicleCase | None, payload_as: PayloadAs = "mass"
-) -> tuple[Loads, Breakdown, BaseMotion | None]:
-    """Loads with friction, their breakdown, and the base's motion.
+def _move(evaluation: Evaluation, trajectory: Trajectory, profile: str, duty: Duty | None = None) -> Move:
+    grid, vehicle = evaluation.trajectory, evaluation.vehicle
+    report = Report(
+        profile=profile,
+        duration=grid.duration if duty is None else duty.duration,
+        rows=check_rows(evaluation, duty),
+        notes=(*grid.notes, *_vehicle_notes(vehicle)),
+        assumptions=assumptions(evaluation.boom, grid.qddd is not None),
+        peaks=_peaks(evaluation),
+        certificate=certified(evaluation),
+    )
+    return Move(profile, trajectory, evaluation, report)
 
-    Raises:
-        InputError: as `_finite_loads`.
-    """
-    base = None if vehicle is None else base_motion(vehicle, trajectory.t)
-    states = (trajectory.q, trajectory.qd, trajectory.qdd)
-    loads = _finite_loads(boom, trajectory, base, payload_as)
+
+def _peaks(evaluation: Evaluation) -> tuple[TorquePeak, ...]:
+    """The largest torque of each joint, in parts."""
+    at = np.abs(evaluation.tau).argmax(axis=0)
+    return torque_peaks(evaluation.t[at], _parts(evaluation, at))
+
+
+def _parts(evaluation: Evaluation, samples: Array | slice = slice(None)) -> Breakdown:
+    motion, base = evaluation.trajectory, evaluation.vehicle.base(evaluation.t[samples])
+    states = (motion.q[samples], motion.qd[samples], motion.qdd[samples])
     with np.errstate(over="ignore", invalid="ignore"):
-        parts = breakdown(boom, *states, base=base, payload_as=payload_as, friction=True)
-    return loads, parts, base
+        return breakdown(evaluation.boom, *states, base=base, payload_as=evaluation.payload_as, friction=True)
 
 
-def _finite_loads(
-    boom: Boom, trajectory: Trajectory, base: BaseMotion | None, payload_as: PayloadAs, reactions: bool = True
-) -> Loads:
-    """Loads with friction.
-
-    Raises:
-        InputError: a load is not finite, because a state of the motion is absurdly large; names the sample.
-    """
-    states = (trajectory.q, trajectory.qd, trajectory.qdd)
-    with np.errstate(over="ignore", invalid="ignore"):
-        loads = inverse_dynamics(boom, *states, base=base, payload_as=payload_as, friction=True, reactions=reactions)
-    finite = np.isfinite(loads.tau).all(axis=-1)
-    if not finite.all():
-        at = int(np.argmin(finite))
-        raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
-    return loads
-
-
-def _shock(boom: Boom, trajectory: Trajectory, vehicle: VehicleCase, payload_as: PayloadAs) -> Shock:
-    """What the joints bear without the shock, and whether the samples see it."""
-    calm, _, _ = _loads(boom, trajectory, replace(vehicle, peak=0.0), payload_as)
-    start, end = vehicle.shock_start, vehicle.shock_start + vehicle.shock_duration
-    whole = trajectory.t[0] <= start and end <= trajectory.t[-1]
-    inside = (trajectory.t >= start) & (trajectory.t <= end)
-    resolved = bool(whole and inside.sum() >= SHOCK_SAMPLES)
-    return Shock(calm.tau, resolved, inside, vehicle.shock_duration, vehicle.shock_events)
-
-
-def _move(
-    boom: Boom,
-    profile: Profile,
-    vehicle: VehicleCase | None,
-    trajectory: Trajectory,
-    fine: Trajectory | None,
-    motions: tuple[Motion, ...],
-    base: BaseMotion | None = None,
-    average_torque: bool = False,
-) -> Move:
-    loads, parts, _ = _loads(boom, trajectory, vehicle)
-    report = check(boom, trajectory if fine is None else fine, profile=profile, vehicle=vehicle)
-    if motions:
-        certificate = certify(boom, motions, base, average_torque)
-        report = replace(report, certificate=certificate, stop=worst_stop(boom, motions, base))
-    return Move(boom, profile, trajectory, loads, parts, report, motions, vehicle)
-
-
-def _vehicle_notes(vehicle: VehicleCase | None) -> tuple[str, ...]:
-    if vehicle is None:
+def _vehicle_notes(vehicle: VehicleCase) -> tuple[str, ...]:
+    if vehicle is LEVEL:
         return ()
     planned = "" if vehicle.is_steady else "; a plan knows its slope alone, the checks all of it"
     return (vehicle.sentence + planned,)

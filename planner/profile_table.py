@@ -1,19 +1,20 @@
 """The profiles side by side on one move."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from boom_model import Boom, InfeasibleError
-from planner.paths.targets import Target
-from planner.planning import Move, plan
+from planner.checks.kinds import CheckKind
+from planner.move_spec import MoveSpec
+from planner.planning import Move, plan_move
 from planner.progress import Track
 from planner.reports.markdown import table
 from planner.reports.report import Report
+from planner.timing.limit_ratios import Limit
 from planner.timing.path_limits import jerk_stretch
-from planner.timing.timing import Profile
+from planner.timing.profile import PROFILES, TimeOptimal, TimingProfile
 
 
 @dataclass(frozen=True)
@@ -39,26 +40,24 @@ class ProfileRow:
 HEADER = ("profile", "duration", "velocity", "acceleration", "jerk", "gearbox", "motor torque", "motor speed", "worst stop")
 
 
-def profile_moves(
-    boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any
-) -> tuple[dict[str, Move], dict[str, str]]:
+def profile_moves(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[dict[str, Move], dict[str, str]]:
     """One move with every profile, the time-optimal one also with its jerk bounded, by name; and why the others cannot be.
 
     Args:
+        spec: the move; its own profile plays no part.
         track: iterates over the profiles, and may show how far it is.
-        options: of `plan`, other than the profile's.
 
     Raises:
         InputError: as `plan`.
         InfeasibleError: as `plan`, where no profile can make the move.
     """
-    timings: list[tuple[str, dict[str, Any]]] = [(profile.value, {"profile": profile}) for profile in Profile]
-    timings.append(("time-optimal, jerk bound", {"profile": Profile.TIME_OPTIMAL, "jerk_bound": True}))
+    profiles: list[tuple[str, TimingProfile]] = [(str(name), kind()) for name, kind in PROFILES.items()]
+    profiles.append(("time-optimal, jerk bound", TimeOptimal(jerk_bound=True)))
     moves: dict[str, Move] = {}
     refused: dict[str, str] = {}
-    for name, timing in track(timings):
+    for name, profile in track(profiles):
         try:
-            moves[name] = plan(boom, start, goal, **timing, **options)
+            moves[name] = plan_move(boom, replace(spec, profile=profile))
         except InfeasibleError as error:
             refused[name] = str(error)
     if not moves:
@@ -66,9 +65,9 @@ def profile_moves(
     return moves, refused
 
 
-def profile_table(boom: Boom, start: Target, goal: Target, **options: Any) -> tuple[ProfileRow, ...]:
+def profile_table(boom: Boom, spec: MoveSpec) -> tuple[ProfileRow, ...]:
     """The rows of `profile_moves`, with the same arguments."""
-    return profile_rows(profile_moves(boom, start, goal, **options)[0])
+    return profile_rows(profile_moves(boom, spec)[0])
 
 
 def profile_rows(moves: Mapping[str, Move]) -> tuple[ProfileRow, ...]:
@@ -101,7 +100,7 @@ def cells(row: ProfileRow) -> tuple[str, ...]:
 
 
 def _row(name: str, move: Move) -> ProfileRow:
-    report = move.report
+    report = move.full_report
     if report.certificate is None or report.stop is None:  # an empty move
         return ProfileRow(name, 0.0, 0.0, 0.0, 0.0, None, None, None, 0.0, 0.0, report.verdict)
     worst = {each.limit: each.ratio for each in report.certificate.worst}
@@ -110,11 +109,11 @@ def _row(name: str, move: Move) -> ProfileRow:
     return ProfileRow(
         profile=name,
         duration_s=report.duration,
-        velocity=worst["velocity"],
-        acceleration=worst["acceleration"],
+        velocity=worst[Limit.VELOCITY],
+        acceleration=worst[Limit.ACCELERATION],
         jerk=jerk,
-        gearbox_torque=worst.get("gearbox torque"),
-        motor_torque=worst.get("motor torque"),
+        gearbox_torque=worst.get(Limit.GEARBOX_TORQUE),
+        motor_torque=worst.get(Limit.MOTOR_TORQUE),
         motor_speed=_motor_speed(report),
         stop_s=report.stop.time_s,
         stop_m=report.stop.distance_m,
@@ -133,5 +132,5 @@ def _continuous(move: Move, part: int) -> bool:
 
 
 def _motor_speed(report: Report) -> float | None:
-    rows = [row for row in report.rows if row.check == "motor speed" and row.demand is not None and row.limit]
+    rows = [row for row in report.rows if row.kind is CheckKind.MOTOR_SPEED and row.demand is not None and row.limit]
     return max((row.demand / row.limit for row in rows if row.demand is not None and row.limit), default=None)

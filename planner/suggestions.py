@@ -1,16 +1,20 @@
-"""What would mend a move that cannot be made: the smallest single change of each kind, verified by planning again."""
+"""What would make a move possible: the smallest single change of each kind, verified by planning again."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from boom_model import JOINTS, ActuatorHorizontal, Boom, Drive, InfeasibleError
-from planner.checks.motion_checks import Verdict
-from planner.paths.targets import Target, resolve
-from planner.planning import plan
+from boom_model import JOINTS, Boom, Drive, InfeasibleError
+from planner.bisection import bisect
+from planner.checks.certificate import certified
+from planner.checks.evaluation import evaluate
+from planner.checks.motion_checks import check_rows
+from planner.checks.rows import Verdict, overall
+from planner.move_spec import MoveSpec
+from planner.paths.targets import resolve
+from planner.planning import plan_motion
 from planner.progress import Track
 
 _MOST = 4.0
@@ -19,13 +23,11 @@ _MOST = 4.0
 _COARSE = 0.05  # [s], the sampling step of a trial
 _BISECTIONS = 8
 
-
-Works = Callable[..., bool]
 Change = Callable[[Boom, Sequence[int], float], Boom]
 
 
 @dataclass(frozen=True)
-class Remedy:
+class Suggestion:
     """One change that makes the move possible, all else the same."""
 
     change: str
@@ -33,8 +35,8 @@ class Remedy:
     sentence: str
 
 
-def remedies(boom: Boom, start: Target, goal: Target, track: Track = iter, **options: Any) -> tuple[Remedy, ...]:
-    """The least change of each kind with which `plan(boom, start, goal, **options)` succeeds and no check FAILs.
+def suggestions(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[Suggestion, ...]:
+    """The least change of each kind with which `plan_move(boom, spec)` succeeds and no check FAILs.
 
     Payload (less), duration (longer), the gear ratio of one joint (higher, all else of the sheet unchanged), the drive of one
     joint (its torques scaled), one joint's velocity, acceleration and jerk limits (higher; these three at all joints where
@@ -44,70 +46,74 @@ def remedies(boom: Boom, start: Target, goal: Target, track: Track = iter, **opt
 
     Args:
         track: iterates over the kinds of change, and may show how far it is.
-        options: of `plan`.
     """
-
-    coarse = {**options, "step": _COARSE, "rate": None}
-
-    def works(changed: Boom = boom, **other: Any) -> bool:
-        try:
-            return plan(changed, start, goal, **{**coarse, **other}).report.verdict is not Verdict.FAIL
-        except InfeasibleError:
-            return False
-
-    if works():
+    spec = replace(spec, step=_COARSE, rate=None)
+    if works(boom, spec):
         return ()
     driven = [i for i, drive in enumerate(boom.drives) if drive is not None]
-    kinds: list[Callable[[], Iterator[Remedy]]] = [
-        partial(_payload, boom, works),
-        partial(_duration, boom, works, start, goal, options),
-        partial(_scaled, boom, works, "ratio", _geared, driven),
-        partial(_scaled, boom, works, "drive", _stronger, driven),
-        partial(_scaled, boom, works, "limit", _faster, range(5)),
-        partial(_orders, boom, works, start, goal, options),
+    kinds: list[Callable[[], Iterator[Suggestion]]] = [
+        partial(_payload, boom, spec),
+        partial(_duration, boom, spec),
+        partial(_scaled, boom, spec, "ratio", _geared, driven),
+        partial(_scaled, boom, spec, "drive", _stronger, driven),
+        partial(_scaled, boom, spec, "limit", _faster, range(5)),
+        partial(_orders, boom, spec),
     ]
-    return tuple(remedy for kind in track(kinds) for remedy in kind())
+    return tuple(suggestion for kind in track(kinds) for suggestion in kind())
 
 
-def _payload(boom: Boom, works: Works) -> Iterator[Remedy]:
+def works(boom: Boom, spec: MoveSpec) -> bool:
+    """Whether a move can be planned and no check FAILs."""
+    try:
+        planned = plan_motion(boom, spec)
+    except InfeasibleError:
+        return False
+    reactions = boom.mount.force is not None or boom.mount.moment is not None
+    evaluation = evaluate(boom, planned, vehicle=spec.vehicle, reactions=reactions)
+    certificate = certified(evaluation)
+    if certificate is not None and certificate.broken:
+        return False
+    return overall(check_rows(evaluation)) is not Verdict.FAIL
+
+
+def _payload(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
     mass = boom.payload.mass
-    if mass <= 0.0 or not works(boom.with_payload(0.0)):
+
+    def carries(payload: float) -> bool:
+        return works(boom.with_payload(payload), spec)
+
+    if mass <= 0.0 or not carries(0.0):
         return
-    good, bad = 0.0, mass
-    for _ in range(_BISECTIONS):
-        middle = (good + bad) / 2.0
-        good, bad = (middle, bad) if works(boom.with_payload(middle)) else (good, middle)
-    rounded = np.floor(good * 10.0) / 10.0
-    if works(boom.with_payload(float(rounded))):
-        yield Remedy("payload", f"a payload of {rounded:g} kg instead of {mass:g} kg")
+    rounded = float(np.floor(bisect(carries, good=0.0, bad=mass, steps=_BISECTIONS) * 10.0) / 10.0)
+    if carries(rounded):
+        yield Suggestion("payload", f"a payload of {rounded:g} kg instead of {mass:g} kg")
 
 
-def _duration(boom: Boom, works: Works, start: Target, goal: Target, options: dict[str, Any]) -> Iterator[Remedy]:
-    given = options.get("duration")
-    if given is None:
+def _duration(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
+    if spec.duration is None:
         return
     try:
-        least = plan(boom, start, goal, **{**options, "step": _COARSE, "duration": None}).report.duration
+        least = plan_motion(boom, replace(spec, duration=None)).duration
     except InfeasibleError:
         return
     rounded = float(np.ceil(least * 100.0) / 100.0)
-    if works(duration=rounded):
-        yield Remedy("duration", f"a duration of {rounded:g} s instead of {given:g} s")
+    if works(boom, replace(spec, duration=rounded)):
+        yield Suggestion("duration", f"a duration of {rounded:g} s instead of {spec.duration:g} s")
 
 
-def _scaled(boom: Boom, works: Works, kind: str, change: Change, joints: Sequence[int]) -> Iterator[Remedy]:
+def _scaled(boom: Boom, spec: MoveSpec, kind: str, change: Change, joints: Sequence[int]) -> Iterator[Suggestion]:
     """The least factor at each joint by itself or, where none helps, at all of them."""
     found = False
     for which in ([i] for i in joints):
-        factor = _least_factor(works, partial(change, boom, which))
+        factor = _least_factor(spec, partial(change, boom, which))
         if factor is not None:
             found = True
-            yield Remedy(kind, _SENTENCES[kind].format(joints=JOINTS[which[0]], factor=factor))
+            yield Suggestion(kind, _SENTENCES[kind].format(joints=JOINTS[which[0]], factor=factor))
     if not found and len(joints) > 1:
-        factor = _least_factor(works, partial(change, boom, joints))
+        factor = _least_factor(spec, partial(change, boom, joints))
         if factor is not None:
             names = ", ".join(JOINTS[i] for i in joints)
-            yield Remedy(kind, _SENTENCES[kind].format(joints=names, factor=factor))
+            yield Suggestion(kind, _SENTENCES[kind].format(joints=names, factor=factor))
 
 
 _SENTENCES = {
@@ -152,34 +158,35 @@ def _faster(boom: Boom, joints: Sequence[int], factor: float) -> Boom:
     return replace(boom, limits=replace(limits, velocity=velocity, acceleration=acceleration, jerk=jerk))
 
 
-def _orders(boom: Boom, works: Works, start: Target, goal: Target, options: dict[str, Any]) -> Iterator[Remedy]:
-    if options.get("via") or not (isinstance(options.get("along", "joint"), str) and options.get("along", "joint") == "joint"):
+def _orders(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
+    if spec.via or not (isinstance(spec.along, str) and spec.along == "joint"):
         return
-    pitch, hold = options.get("pitch", -np.pi / 2.0), options.get("hold") or ActuatorHorizontal()
     try:
-        a = resolve(boom, start, pitch, hold)
-        b = resolve(boom, goal, pitch, hold, reference=a)
+        a = resolve(boom, spec.start, spec.pitch, spec.constraint)
+        b = resolve(boom, spec.goal, spec.pitch, spec.constraint, reference=a)
     except InfeasibleError:
         return
     for name, moved_from, moved_to in (("first", a, b), ("last", b, a)):
         between = moved_from.copy()
         between[3] = moved_to[3]
-        if boom.limits.hold(between) and works(via=[between]):
-            yield Remedy("order", f"the extension {name}, by itself")
+        if boom.limits.hold(between) and works(boom, replace(spec, via=(between,))):
+            yield Suggestion("order", f"the extension {name}, by itself")
 
 
-def _least_factor(works: Works, changed: Callable[[float], Boom]) -> float | None:
+def _least_factor(spec: MoveSpec, changed: Callable[[float], Boom]) -> float | None:
     """The least factor up to _MOST that works, rounded up to a hundredth; None where that does not."""
-    if not works(changed(_MOST)):
+
+    def helps(factor: float) -> bool:
+        return works(changed(factor), spec)
+
+    if not helps(_MOST):
         return None
-    bad, good = 1.0, _MOST
-    for _ in range(_BISECTIONS):
-        middle = float(np.sqrt(bad * good))
-        bad, good = (bad, middle) if works(changed(middle)) else (middle, good)
-    rounded = float(np.ceil(good * 100.0) / 100.0)
-    return rounded if works(changed(rounded)) else None
+    rounded = float(np.ceil(bisect(helps, good=_MOST, bad=1.0, steps=_BISECTIONS, geometric=True) * 100.0) / 100.0)
+    return rounded if helps(rounded) else None
 
 
 def _with_drives(boom: Boom, joints: Sequence[int], change: Callable[[Drive], Drive]) -> Boom:
-    drives = (change(drive) if drive is not None and i in joints else drive for i, drive in enumerate(boom.drives))
-    return replace(boom, drives=tuple(drives))
+    for i in joints:
+        drive = boom.drives[i]
+        boom = boom if drive is None else boom.with_drive(JOINTS[i], change(drive))
+    return boom

@@ -1,4 +1,4 @@
-"""Why a move cannot be made, and what would mend it: each remedy is applied by hand, and so is a slightly smaller one."""
+"""Why a move cannot be made, and what would make it possible: each suggestion applied by hand, and a smaller one."""
 
 import re
 from dataclasses import replace
@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from boom_model import JOINTS, Boom, InfeasibleError, forward_kinematics, inverse_dynamics
-from planner import Profile, Verdict, plan
-from planner.suggestions import remedies
+from planner import MoveSpec, Profile, Verdict, plan
+from planner.suggestions import suggestions
 from tests.limits import EFFICIENCY, INERTIA, motor_allows
 from tests.paths.test_keep_out import POST, ROUND_POST, with_shapes
 
@@ -36,7 +36,7 @@ def factor(sentence):
 def test_payload_ratio_and_drive_that_mend_an_overload(profile):
     heavy = BOOM.with_payload(38.0)
     assert not works(heavy, profile=profile, step=STEP)
-    found = by_kind(remedies(heavy, *POSES, profile=profile))
+    found = by_kind(suggestions(heavy, MoveSpec.of(*POSES, profile=profile)))
     assert {"payload", "ratio", "drive"} & set(found)
     (sentence,) = found["payload"]
     mass = float(re.fullmatch(r"a payload of ([\d.]+) kg instead of 38 kg", sentence)[1])
@@ -67,7 +67,7 @@ def test_payload_ratio_and_drive_that_mend_an_overload(profile):
 @pytest.mark.parametrize("profile", Profile)
 def test_duration_that_mends_haste(profile):
     least = plan(BOOM, *POSES, profile=profile).report.duration
-    found = by_kind(remedies(BOOM, *POSES, profile=profile, duration=0.8 * least))
+    found = by_kind(suggestions(BOOM, MoveSpec.of(*POSES, profile=profile, duration=0.8 * least)))
     (sentence,) = found["duration"]
     duration = float(re.match(r"a duration of ([\d.]+) s instead of", sentence)[1])
     assert least - 1e-9 <= duration <= least + 0.0101
@@ -79,7 +79,7 @@ def test_limits_that_mend_haste_are_those_of_the_joints_that_hold_the_move_back(
     """The cubic's least duration falls in proportion to the speed of the joint that decides, until the next one does."""
     least = plan(BOOM, *POSES).report.duration
     asked = least / 1.3
-    found = by_kind(remedies(BOOM, *POSES, duration=asked))
+    found = by_kind(suggestions(BOOM, MoveSpec.of(*POSES, duration=asked)))
     for sentence in found["limit"]:
         joints = np.isin(JOINTS, [name for name in JOINTS if re.search(rf"\b{name}\b", sentence)])
 
@@ -98,21 +98,21 @@ def test_an_order_that_mends_an_overload_really_does():
     raised, run_out = goal.copy(), start.copy()
     raised[3], run_out[3] = start[3], goal[3]
     boom = BOOM.with_payload(30.0)
-    found = by_kind(remedies(boom, start, goal, profile="time-optimal"))
+    found = by_kind(suggestions(boom, MoveSpec.of(start, goal, profile="time-optimal")))
     assert found["order"] == ["the extension last, by itself"]
     assert not works(boom, start, goal, profile="time-optimal")
     assert works(boom, start, goal, profile="time-optimal", via=[raised])
     assert not works(boom, start, goal, profile="time-optimal", via=[run_out])
 
 
-def test_what_works_needs_no_remedy():
-    assert remedies(BOOM, *POSES) == ()
+def test_what_works_needs_no_suggestion():
+    assert suggestions(BOOM, MoveSpec.of(*POSES)) == ()
 
 
 def test_a_shape_in_the_way_is_not_mended_by_a_stronger_drive():
     inside = ROUND_POST[0].copy()
     inside[0] = np.radians(45)
-    assert remedies(with_shapes(POST), ROUND_POST[0], inside) == ()
+    assert suggestions(with_shapes(POST), MoveSpec.of(ROUND_POST[0], inside)) == ()
 
 
 @pytest.mark.parametrize("profile", Profile)

@@ -79,7 +79,7 @@ def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
         uncounted += [f"{JOINTS[i]}: no {name} is printed" for name, value in known.items() if value is None]
         for name, value in zip(widths, (drive.gearbox.backlash, drive.gearbox.hysteresis, step), strict=True):
             widths[name][i] = value or 0.0
-    moved = np.einsum("...ij,...j->...i", J, yields)
+    moved = sum((J[..., i] * yields[..., i, None] for i, drive in enumerate(boom.drives) if drive), np.zeros(J.shape[:-1]))
     return TipDeflection(moved, **{name: _worst(J, width) for name, width in widths.items()}, uncounted=tuple(uncounted))
 
 
@@ -112,11 +112,12 @@ def _step_error(drive: Drive) -> float | None:
 
 def _worst(J: Array, widths: Array) -> Array:
     """max over signs of |sum_i +-J_i w_i| (...), J (..., 3, 5); the first sign is free."""
-    columns = J * widths
-    used = np.flatnonzero(widths)
-    signs = np.array([(1.0, *rest) for rest in product((1.0, -1.0), repeat=max(len(used) - 1, 0))])
-    if not len(used):
+    moves = [J[..., i] * widths[i] for i in np.flatnonzero(widths)]
+    if not moves:
         return np.zeros(J.shape[:-2])
-    sums = np.einsum("...ij,kj->...ki", columns[..., used], signs)
-    worst: Array = np.linalg.norm(sums, axis=-1).max(axis=-1)
+    squares = []
+    for signs in product((1.0, -1.0), repeat=len(moves) - 1):
+        total = sum((sign * move for sign, move in zip(signs, moves[1:], strict=True)), moves[0])
+        squares.append(np.square(total).sum(axis=-1))
+    worst: Array = np.sqrt(np.maximum.reduce(squares))
     return worst

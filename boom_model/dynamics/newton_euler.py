@@ -126,7 +126,7 @@ def inverse_dynamics(
         applied = _Applied(*(None if x is None else _into_plane(state, x[part].T) for x in (push, twist)))
         _newton_euler(model, state, plane, applied, out.part(part))
         if friction:
-            out.tau[part] += boom.friction.viscous * motion[1][part] + boom.friction.coulomb * np.sign(motion[1][part])
+            out.tau[part] += boom.friction.torque(motion[1][part])
         if drive_inertia:
             out.tau[part] += rotors * motion[2][part]
     return Loads(

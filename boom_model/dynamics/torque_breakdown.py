@@ -64,6 +64,6 @@ def breakdown(
         inertia=bare - gravity - velocity,
         velocity=velocity,
         payload=still - bare,
-        friction=boom.friction.viscous * qd + boom.friction.coulomb * np.sign(qd) if friction else zero,
+        friction=boom.friction.torque(qd) if friction else zero,
         vehicle=zero if base is None else tau(boom, base) - still,
     )

@@ -77,13 +77,15 @@ def jacobian(boom: Boom, q: ArrayLike) -> Array:
     c3, s3 = np.cos(q[..., 2]), np.sin(q[..., 2])
     cp, sp = np.cos(q[..., 2] + q[..., 4]), np.sin(q[..., 2] + q[..., 4])
     r, _ = _tip_in_plane(boom, q)
-    zero, one = np.zeros_like(r), np.ones_like(r)
     dr = (-g.L9 * s2, rho * s3 + g.L6 * c3 - g.L8 * cp, -c3, -g.L8 * cp)
     dz = (g.L9 * c2, -rho * c3 + g.L6 * s3 - g.L8 * sp, -s3, -g.L8 * sp)
-    columns = [np.stack([-s1 * r, c1 * r, zero, zero, zero, one], axis=-1)]
-    for i, turn in enumerate((zero, one, zero, one)):
-        columns.append(np.stack([c1 * dr[i], s1 * dr[i], dz[i], s1 * turn, -c1 * turn, zero], axis=-1))
-    return np.stack(columns, axis=-1)
+    J = np.zeros((*r.shape, 6, 5))
+    J[..., 0, 0], J[..., 1, 0], J[..., 5, 0] = -s1 * r, c1 * r, 1.0
+    for i in range(4):
+        J[..., 0, i + 1], J[..., 1, i + 1], J[..., 2, i + 1] = c1 * dr[i], s1 * dr[i], dz[i]
+    for turning in (2, 4):
+        J[..., 3, turning], J[..., 4, turning] = s1, -c1
+    return J
 
 
 def jacobian_rate(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:

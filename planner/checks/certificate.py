@@ -1,22 +1,23 @@
 """What a planned motion asks of each limit at worst, recomputed from the model on a grid finer than the planner's."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from boom_model import JOINTS, BaseMotion, Boom, inverse_dynamics
 from boom_model.arrays import Array
-from boom_model.drives.drive import available_torque, motor_limit
-from planner.checks.motion_checks import average_torque as mean
-from planner.timing.path_limits import gear_ratio, looks, motor_ratio
+from planner.checks.drives.duty import Duty
+from planner.checks.evaluation import Evaluation
+from planner.timing.limit_ratios import RATIO_TOLERANCE, Limit, limit_ratios
 from planner.timing.time_law import Motion
 
-RATIO_TOLERANCE = 1e-3
-"""How far above 1 a ratio may be: what a planner may miss between the points that it looks at."""
+LEAST_SAMPLES = 5_000
+"""Points at which a part of a motion is certified at least, besides both sides of every jump.
 
-FINER = 10
-"""A motion is certified at this many times the points that its planner looked at, and at both sides of every jump."""
+2,001 were measured to miss at most 2e-6 of a limit that 100,000 see, on 84 motions of every profile along straight, smooth and
+tip paths: RATIO_TOLERANCE is 500 times that.
+"""
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,25 @@ class Certificate:
         return tuple(worst for worst in self.worst if worst.ratio > 1.0 + RATIO_TOLERANCE)
 
 
-def certify(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = None, average_torque: bool = False) -> Certificate:
+@dataclass(frozen=True, eq=False)
+class _States:
+    """States and torques at times t (n,), each (n, 5)."""
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    qddd: Array
+    tau: Array
+
+
+def certify(
+    boom: Boom,
+    motions: Sequence[Motion],
+    base: BaseMotion | None = None,
+    average_torque: bool = False,
+    evaluated: Evaluation | None = None,
+) -> Certificate:
     """Positions, linkage, velocities, accelerations, jerks where they are limited, gearbox and motor torque.
 
     Friction is counted. Only the base's tilt is: what else a vehicle does was not planned for. A motor whose supply is not
@@ -56,52 +75,58 @@ def certify(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = Non
 
     Args:
         average_torque: whether the gearboxes' average torque was asked for too.
+        evaluated: of the same motions on the same base; its states are not evaluated again.
     """
-    parts = [motion.times(FINER * looks(motion.path)) for motion in motions]
-    starts = np.cumsum([0.0, *(motion.duration for motion in motions)])
-    t = np.concatenate([start + part for start, part in zip(starts[:-1], parts, strict=True)])
-    states = zip(*(motion(part) for motion, part in zip(motions, parts, strict=True)), strict=True)
-    q, qd, qdd, qddd = (np.concatenate(each) for each in states)
-    tau = inverse_dynamics(boom, q, qd, qdd, base=base, friction=True, reactions=False).tau
-    jerk = qddd if all(motion.law.jerk_limited for motion in motions) else None
-    ratios = dict(_ratios(boom, q, qd, qdd, jerk, tau))
+    jerk_limited = all(motion.law.jerk_limited for motion in motions)
+    states = _states(boom, motions, base, evaluated)
+    jerk = states.qddd if jerk_limited else None
     worst = []
-    for limit, ratio in ratios.items():
+    for limit, ratio in limit_ratios(boom, states.q, states.qd, states.qdd, jerk, states.tau).items():
         at, joint = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
-        worst.append(WorstRatio(limit, JOINTS[joint], float(ratio[at, joint]), float(t[at])))
+        worst.append(WorstRatio(limit, JOINTS[joint], float(ratio[at, joint]), float(states.t[at])))
     if average_torque:
-        worst += _averages(boom, t, qd, tau)
+        worst += _averages(boom, states)
     laws = [motion.law for motion in motions]
-    return Certificate(len(t), tuple(worst), sum(law.iterations for law in laws), max(law.residual for law in laws))
+    return Certificate(len(states.t), tuple(worst), sum(law.iterations for law in laws), max(law.residual for law in laws))
 
 
-def _ratios(boom: Boom, q: Array, qd: Array, qdd: Array, qddd: Array | None, tau: Array) -> Iterator[tuple[str, Array]]:
-    """Each limit's name with (n, 5) ratios to it; limits that no drive gives are left out."""
-    limits = boom.limits
-    half, middle = (limits.upper - limits.lower) / 2.0, (limits.upper + limits.lower) / 2.0
-    away = np.abs(q - middle)
-    yield "position", np.divide(away, half, out=np.where(away > 0.0, np.inf, 0.0), where=half > 0.0)
-    gap, linkage = q[:, 2] - q[:, 1], np.zeros_like(q)
-    linkage[:, 2] = np.divide(limits.linkage, gap, out=np.full_like(gap, np.inf), where=gap > 0.0)
-    yield "lower - inner", linkage
-    yield "velocity", np.abs(qd) / limits.velocity
-    yield "acceleration", np.abs(qdd) / limits.acceleration
-    if qddd is not None:
-        yield "jerk", np.abs(qddd) / limits.jerk
-    fed = all(
-        available_torque(drive, 0.0) is not None for drive in boom.drives if drive and motor_limit(drive, 0.0) is not None
-    )
-    motor = "motor torque" if fed else "motor torque at standstill"
-    for name, ratio in (("gearbox torque", gear_ratio(boom, tau)), (motor, motor_ratio(boom, tau, qd, qdd))):
-        if ratio.any():
-            yield name, ratio
+def certified(evaluation: Evaluation) -> Certificate | None:
+    """The certificate of an evaluated plan; None of an empty one, and where only samples are known."""
+    planned = evaluation.planned
+    if planned is None or not planned.motions:
+        return None
+    seen = evaluation if evaluation.vehicle.is_steady and evaluation.payload_as == "mass" else None
+    return certify(evaluation.boom, planned.motions, evaluation.vehicle.tilt, planned.average_torque, seen)
 
 
-def _averages(boom: Boom, t: Array, qd: Array, tau: Array) -> list[WorstRatio]:
+def _states(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None, evaluated: Evaluation | None) -> _States:
+    """The evaluation's states, and those beside every jump and of what is missing to LEAST_SAMPLES a part, in order of time."""
+    starts = np.cumsum([0.0, *(motion.duration for motion in motions)])
+    seen = [0] * len(motions)
+    if evaluated is not None:
+        edges = np.searchsorted(evaluated.t, starts)
+        edges[-1] = len(evaluated.t)
+        seen = np.diff(edges).tolist()
+    times = [motion.times(max(1, LEAST_SAMPLES - count)) for motion, count in zip(motions, seen, strict=True)]
+    t = np.concatenate([start + part for start, part in zip(starts[:-1], times, strict=True)])
+    states = [motion(part) for motion, part in zip(motions, times, strict=True)]
+    q, qd, qdd, qddd = (np.concatenate(each) for each in zip(*states, strict=True))
+    tau = inverse_dynamics(boom, q, qd, qdd, base=base, friction=True, reactions=False).tau
+    if evaluated is None:
+        return _States(t, q, qd, qdd, qddd, tau)
+    motion = evaluated.trajectory
+    known = np.zeros_like(motion.q) if motion.qddd is None else motion.qddd
+    order = np.argsort(np.concatenate([motion.t, t]), kind="stable")
+    pairs = ((motion.t, t), (motion.q, q), (motion.qd, qd), (motion.qdd, qdd), (known, qddd), (evaluated.tau, tau))
+    return _States(*(np.concatenate(pair)[order] for pair in pairs))
+
+
+def _averages(boom: Boom, states: _States) -> list[WorstRatio]:
     """The gearbox nearest to its average torque, or beyond it."""
-    ratios = []
+    duty, ratios = Duty.alone(states.t), []
     for i, drive in enumerate(boom.drives):
         limit = None if drive is None else drive.gearbox.max_average_torque
         if limit is not None:
-            ratios.append(WorstRatio("average torque", JOINTS[i], (mean(t, tau[:, i], qd[:, i]) or 0.0) / limit, None))
+            mean = duty.travel_mean(states.tau[:, i], states.qd[:, i]) or 0.0
+            ratios.append(WorstRatio(Limit.AVERAGE_TORQUE, JOINTS[i], mean / limit, None))
     return [max(ratios, key=lambda each: each.ratio)] if ratios else []

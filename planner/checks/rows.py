@@ -1,9 +1,13 @@
 """The rows of a report: one demand held against one limit, and the verdict."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
 from boom_model import Basis, Origin
+from boom_model.boom import LIMIT_TOLERANCE
+from planner.checks.kinds import CheckKind, Severity, Unit
 
 SAMPLING_SLACK = 1e-3
 """A demand within 0.1 % of its limit is on it: a motion is seen at samples, and solvers end within a tolerance."""
@@ -24,68 +28,162 @@ class Verdict(StrEnum):
     INCOMPLETE = "INCOMPLETE"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Row:
     """One demand held against one limit, in SI."""
 
     joint: str
-    check: str
+    kind: CheckKind
     demand: float | None
     limit: float | None
-    unit: str
     margin: float | None
-    """(limit - demand) / demand; the distance to the bound, in `unit`, for positions. None where there is no limit, or
-    nothing is asked."""
-    required_margin: float
+    """As `kind.margin` says; None where there is no limit, or no demand."""
     at_s: float | None
     verdict: Verdict
     basis: Basis | None
     """The weakest of the figures that decide the row; None where nothing decides it."""
     source: str
+    subject: str = ""
+    """What is checked against what, of a kind that has several rows."""
+
+    @property
+    def check(self) -> str:
+        """The kind in words, with its subject."""
+        return f"{self.kind} {self.subject}" if self.subject else str(self.kind)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of demand and limit."""
+        return self.kind.quantity.unit(self.joint)
+
+    @property
+    def shown_unit(self) -> Unit:
+        """The unit in which people read demand and limit."""
+        return self.kind.quantity.for_people(self.joint)
+
+    @property
+    def required_margin(self) -> float:
+        return self.kind.required_margin
+
+    def to_json(self) -> dict[str, Any]:
+        """The row's object in the JSON of `boom plan` and `boom check`, in SI."""
+        return {
+            "joint": self.joint,
+            "check": self.check,
+            "demand": self.demand,
+            "limit": self.limit,
+            "unit": self.unit,
+            "margin": self.margin,
+            "required_margin": self.required_margin,
+            "at_s": self.at_s,
+            "verdict": self.verdict,
+            "basis": self.basis,
+            "source": self.source,
+        }
 
 
-def held(
+def compared(
+    *,
     joint: str,
-    check: str,
+    kind: CheckKind,
     demand: float,
     limit: float | None,
-    unit: str,
-    at: float | None,
     origin: Origin,
-    required: float = 0.0,
+    at: float | None = None,
     warn_near: bool = False,
 ) -> Row:
-    """A demand against a limit that it may not exceed; without a limit, NOT CHECKABLE."""
+    """A demand held against a limit that it may not exceed; NOT CHECKABLE without one.
+
+    Beyond the limit a guideline WARNs and a limit FAILs.
+
+    Args:
+        warn_near: whether a limit that is only estimated WARNs where the margin is within ESTIMATE_WARNING of the required one.
+    """
     if limit is None:
-        return Row(joint, check, demand, None, unit, None, required, at, Verdict.NOT_CHECKABLE, None, origin.source)
-    margin = _margin(demand, limit)
+        return unknown(joint=joint, kind=kind, demand=demand, at=at, why=origin.source)
+    margin, required = _ratio(demand, limit), kind.required_margin
     if margin is None or margin >= required + (ESTIMATE_WARNING if warn_near else 0.0):
         verdict = Verdict.PASS
     elif not margin >= required - SAMPLING_SLACK:
-        verdict = Verdict.FAIL
+        verdict = Verdict.WARN if kind.severity is Severity.GUIDELINE else Verdict.FAIL
     else:
         verdict = Verdict.WARN if warn_near else Verdict.PASS
-    return Row(joint, check, demand, limit, unit, margin, required, at, verdict, origin.basis, origin.source)
+    return Row(
+        joint=joint,
+        kind=kind,
+        demand=demand,
+        limit=limit,
+        margin=margin,
+        at_s=at,
+        verdict=verdict,
+        basis=origin.basis,
+        source=origin.source,
+    )
 
 
-def guided(joint: str, check: str, demand: float, limit: float | None, unit: str, at: float | None, origin: Origin) -> Row:
-    """A demand against a rule of thumb: beyond it WARN, never FAIL; without a figure, NOT CHECKABLE."""
-    row = held(joint, check, demand, limit, unit, at, origin)
-    verdict = Verdict.WARN if row.verdict is Verdict.FAIL else row.verdict
-    return Row(joint, check, demand, limit, unit, row.margin, 0.0, at, verdict, row.basis, origin.source)
-
-
-def told(
-    joint: str, check: str, figure: float | None, unit: str, at: float | None, origin: Origin, limit: float | None = None
+def bounded(
+    *, joint: str, kind: CheckKind, value: float, bound: float, distance: float, at: float, origin: Origin, subject: str = ""
 ) -> Row:
-    """A figure for information, beside a `limit` that does not decide; one that cannot be had is NOT CHECKABLE."""
+    """A position or an angle and its distance to the bound, negative beyond it: a limit FAILs there, a guideline WARNs."""
+    guideline = kind.severity is Severity.GUIDELINE
+    inside = distance >= (0.0 if guideline else -LIMIT_TOLERANCE)
+    return Row(
+        joint=joint,
+        kind=kind,
+        demand=float(value),
+        limit=float(bound),
+        margin=0.0 if abs(distance) <= LIMIT_TOLERANCE and not guideline else float(distance),
+        at_s=float(at),
+        verdict=Verdict.PASS if inside else Verdict.WARN if guideline else Verdict.FAIL,
+        basis=origin.basis,
+        source=origin.source,
+        subject=subject,
+    )
+
+
+def informative(
+    *, joint: str, kind: CheckKind, figure: float | None, origin: Origin, at: float | None = None, limit: float | None = None
+) -> Row:
+    """A figure for information, beside a `limit` that does not decide; NOT CHECKABLE where there is no figure."""
     if figure is None:
-        return Row(joint, check, None, None, unit, None, 0.0, None, Verdict.NOT_CHECKABLE, None, origin.source)
-    margin = None if limit is None else _margin(figure, limit)
-    return Row(joint, check, figure, limit, unit, margin, 0.0, at, Verdict.INFO, origin.basis, origin.source)
+        return unknown(joint=joint, kind=kind, why=origin.source)
+    return Row(
+        joint=joint,
+        kind=kind,
+        demand=figure,
+        limit=limit,
+        margin=None if limit is None else _ratio(figure, limit),
+        at_s=at,
+        verdict=Verdict.INFO,
+        basis=origin.basis,
+        source=origin.source,
+    )
 
 
-def overall(rows: tuple[Row, ...]) -> Verdict:
+def unknown(
+    *,
+    joint: str,
+    kind: CheckKind,
+    why: str,
+    demand: float | None = None,
+    limit: float | None = None,
+    at: float | None = None,
+) -> Row:
+    """A check that cannot be made, for want of a limit or of the demand."""
+    return Row(
+        joint=joint,
+        kind=kind,
+        demand=demand,
+        limit=limit,
+        margin=None,
+        at_s=at,
+        verdict=Verdict.NOT_CHECKABLE,
+        basis=None,
+        source=why,
+    )
+
+
+def overall(rows: Iterable[Row]) -> Verdict:
     """FAIL where a row fails, INCOMPLETE where one could not be checked, PASS otherwise (a WARN passes)."""
     verdicts = {row.verdict for row in rows}
     if Verdict.FAIL in verdicts:
@@ -93,5 +191,5 @@ def overall(rows: tuple[Row, ...]) -> Verdict:
     return Verdict.INCOMPLETE if Verdict.NOT_CHECKABLE in verdicts else Verdict.PASS
 
 
-def _margin(demand: float, limit: float) -> float | None:
+def _ratio(demand: float, limit: float) -> float | None:
     return (limit - demand) / demand if demand > 0.0 else None

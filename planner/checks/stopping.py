@@ -10,8 +10,8 @@ from boom_model import BaseMotion, Boom, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array, Mask, scalar
 from boom_model.boom import LIMIT_TOLERANCE
 from boom_model.errors import InputError
-from planner.checks.certificate import RATIO_TOLERANCE
 from planner.paths.path import JointLine, SplinePath
+from planner.timing.limit_ratios import RATIO_TOLERANCE, rate_ratios
 from planner.timing.path_limits import load_ratio
 from planner.timing.time_law import Motion, TimeLaw
 
@@ -215,11 +215,8 @@ def _kept(boom: Boom, motions: list[Motion | None], base: BaseMotion | None) -> 
     starts = np.cumsum([0, *(len(each[0]) for each in states)])[:-1]
     q, qd, qdd, qddd = (np.concatenate(each) for each in zip(*states, strict=True))
     tau = inverse_dynamics(boom, q, qd, qdd, base=base, friction=True, reactions=False).tau
-    limits = boom.limits
-    ratio = np.maximum(np.abs(qd) / limits.velocity, np.abs(qdd) / limits.acceleration)
-    ratio = np.maximum(ratio, load_ratio(boom, tau, qd, qdd))
-    if all(motion.law.jerk_limited for motion in motions if motion is not None):
-        ratio = np.maximum(ratio, np.abs(qddd) / limits.jerk)
-    ratio = np.where(limits.hold(q)[:, None], ratio, np.inf)
+    jerk = qddd if all(motion.law.jerk_limited for motion in motions if motion is not None) else None
+    ratio = np.maximum.reduce([load_ratio(boom, tau, qd, qdd), *rate_ratios(boom, qd, qdd, jerk).values()])
+    ratio = np.where(boom.limits.hold(q)[:, None], ratio, np.inf)
     kept[there] = np.maximum.reduceat(ratio.max(axis=-1), starts) <= 1.0 + RATIO_TOLERANCE
     return kept

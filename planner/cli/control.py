@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -20,7 +20,6 @@ from planner.cli.options import (
     vehicle_option,
 )
 from planner.cli.printing import ANSWER_IS_NO, STYLES, new_console, new_table, print_files, print_json, print_lines, tracked
-from planner.paths.targets import parse_along, parse_hold, parse_pitch, parse_target
 
 if TYPE_CHECKING:
     from planner.control.study import Study
@@ -123,9 +122,10 @@ def control(
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
     from planner.files import check_writable
-    from planner.motion.vehicle import load_case
-    from planner.planning import plan as plan_move
-    from planner.timing.timing import Profile
+    from planner.motion.vehicle import LEVEL, load_case
+    from planner.move_spec import MoveSpec
+    from planner.planning import plan_move
+    from planner.timing.profile import Profile, parse_profile
 
     boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
     if not np.isfinite(settle_mm) or not settle_mm > 0.0:
@@ -153,18 +153,22 @@ def control(
         raise InputError("a stepper runs open loop: there is no Bode diagram of it")
     check_report(document)
     check_writable(out, loops, errors, document)
-    ends = parse_target(start), parse_target(goal)
-    path: dict[str, Any] = {
-        "duration": duration,
-        "pitch": parse_pitch(pitch),
-        "hold": parse_hold(hold),
-        "via": [parse_target(text) for text in via],
-        "stop_at_via": not pass_via,
-        "along": parse_along(along),
-        "jerk_bound": jerk_bound,
-        "vehicle": case,
-    }
-    moves = [plan_move(boom, *ends, profile=profile, **path) for profile in _several("profile", profiles, list(Profile))]
+    specs = [
+        MoveSpec.of(
+            start,
+            goal,
+            profile=parse_profile(profile, jerk_bound=jerk_bound),
+            duration=duration,
+            pitch=pitch,
+            constraint=hold,
+            via=via,
+            stop_at_via=not pass_via,
+            along=along,
+            vehicle=LEVEL if case is None else case,
+        )
+        for profile in _several("profile", profiles, list(Profile))
+    ]
+    moves = [plan_move(boom, spec) for spec in specs]
     names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
     found = study(boom, moves, *names, setup, tracked("simulating"))
     if left_out:

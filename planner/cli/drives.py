@@ -12,6 +12,7 @@ from planner.cli.options import (
     given_catalogue,
     json_option,
     load_boom,
+    load_vehicle,
     payload_as_option,
     payload_option,
     picture_option,
@@ -54,13 +55,12 @@ def mission(
     from planner.checks.rows import Verdict
     from planner.files import check_writable
     from planner.missions.mission import check_cycle, load_mission, plan_cycle
-    from planner.motion.vehicle import load_case
     from planner.planning import torques
     from planner.reports.document import write_document
     from planner.reports.drive_pictures import drive_pages, write_drive_picture
     from planner.reports.side_by_side import compared, side_by_side_markdown
 
-    boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
     check_picture(picture)
     check_report(document)
     check_writable(picture, document)
@@ -141,14 +141,13 @@ def size(
     from boom_model import JOINTS, Catalogue
     from planner.files import check_writable
     from planner.missions.mission import check_steady, load_mission, plan_cycle
-    from planner.motion.vehicle import load_case
     from planner.reports.document import write_document
     from planner.reports.report import assumptions
     from planner.sizing.choice import Adapt, choose, parse_variant, too_high
     from planner.sizing.pictures import sizing_pictures
     from planner.sizing.tables import SAVING, motors, no_motion, ranking, saving, sizing_json, sizing_markdown, sizing_notes
 
-    boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
     check_report(document)
     check_writable(document)
     catalogue = Catalogue.load().with_file(given_catalogue())

@@ -14,6 +14,7 @@ from planner.cli.options import (
     hold_option,
     json_option,
     load_boom,
+    load_vehicle,
     payload_as_option,
     payload_option,
     picture_option,
@@ -22,7 +23,7 @@ from planner.cli.options import (
     vehicle_option,
 )
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
-from planner.paths.targets import parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target
+from planner.paths.targets import parse_joint_velocity, parse_pitch
 
 if TYPE_CHECKING:
     from boom_model.arrays import Array
@@ -100,55 +101,55 @@ def plan(
     """
     from planner.files import check_writable
     from planner.motion.trajectory import write_csv
-    from planner.motion.vehicle import load_case
-    from planner.planning import plan as plan_move
-    from planner.suggestions import remedies
+    from planner.move_spec import MoveSpec
+    from planner.planning import plan_move
+    from planner.suggestions import suggestions
+    from planner.timing.profile import parse_profile
 
     boom = load_boom(boom_file, payload)
-    case = None if vehicle is None else load_case(vehicle)
+    case = load_vehicle(vehicle)
     check_picture(picture)
     check_report(document)
     check_writable(out, csv_file, picture, document)
-    if show_reach and parse_pitch(pitch) is None:
+    elevation = parse_pitch(pitch)
+    if show_reach and elevation is None:
         raise InputError("pitch free: the reach is drawn for one pitch")
-    targets = parse_target(start), parse_target(goal)
     velocities = [parse_joint_velocity(text) for text in via_velocity]
     if velocities and len(velocities) != len(via):
         raise InputError(f"{len(velocities)} --via-velocity for {len(via)} --via; give one for each")
-    options: dict[str, Any] = {
-        "profile": profile,
-        "duration": duration,
-        "pitch": parse_pitch(pitch),
-        "hold": parse_hold(hold),
-        "via": [parse_target(text) for text in via],
-        "stop_at_via": not pass_via,
-        "via_velocities": velocities or None,
-        "along": parse_along(along),
-        "jerk_bound": jerk_bound,
-        "average_torque": average_torque,
-        "vehicle": case,
-        "rate": rate,
-    }
+    spec = MoveSpec.of(
+        start,
+        goal,
+        profile=parse_profile(profile, jerk_bound=jerk_bound, average_torque=average_torque, velocities=velocities or None),
+        duration=duration,
+        pitch=pitch,
+        constraint=hold,
+        via=via,
+        stop_at_via=not pass_via,
+        along=along,
+        vehicle=case,
+        rate=rate,
+    )
+    track = tracked("looking for what would mend it")
     try:
-        move = plan_move(boom, *targets, **options)
+        move = plan_move(boom, spec)
     except InfeasibleError as error:
-        mend = [remedy.sentence for remedy in remedies(boom, *targets, tracked("looking for what would mend it"), **options)]
+        mend = [each.sentence for each in suggestions(boom, spec, track)]
         if as_json:
             failed: dict[str, Any] = {"profile": profile, "duration_s": None, "verdict": "FAIL", "checks": [], "files": {}}
             print_json({**failed, "reason": str(error), "remedies": mend})
         print_lines("Would mend it" if not as_json else None, mend)
         raise
-    report = move.report
+    report = move.full_report
     if report.verdict == "FAIL":
-        found = remedies(boom, *targets, tracked("looking for what would mend it"), **options)
-        report = replace(report, remedies=tuple(remedy.sentence for remedy in found))
+        report = replace(report, suggestions=tuple(each.sentence for each in suggestions(boom, spec, track)))
     from planner.recording import write_recording
 
     reach = None
-    if show_reach:
+    if show_reach and elevation is not None:
         from boom_model.kinematics.reach import reach_map
 
-        reach = reach_map(boom, options["hold"], options["pitch"])
+        reach = reach_map(boom, spec.constraint, elevation)
     written = {"recording": out}
     write_recording(out, move, reach=reach)
     if csv_file is not None:
@@ -193,19 +194,12 @@ def profiles(
       boom profiles transport phenotyping --payload 20 --out profiles.rrd
     """
     from planner.files import check_writable
+    from planner.move_spec import MoveSpec
     from planner.profile_table import HEADER, cells, profile_markdown, profile_moves, profile_rows
 
     check_writable(out)
-    moves, refused = profile_moves(
-        load_boom(boom_file, payload),
-        parse_target(start),
-        parse_target(goal),
-        tracked("planning with each profile"),
-        via=[parse_target(text) for text in via],
-        stop_at_via=not pass_via,
-        pitch=parse_pitch(pitch),
-        hold=parse_hold(hold),
-    )
+    spec = MoveSpec.of(start, goal, via=via, stop_at_via=not pass_via, pitch=pitch, constraint=hold)
+    moves, refused = profile_moves(load_boom(boom_file, payload), spec, tracked("planning with each profile"))
     rows = profile_rows(moves)
     written: dict[str, str] = {}
     if out is not None:
@@ -241,7 +235,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
     Example:
       boom torque move.csv --out torques.csv --payload 8
     """
-    from boom_model import JOINTS
+    from boom_model.boom import JOINTS, LOAD_UNITS
     from planner.motion.motion_files import form_of, read_motion, write_motion
     from planner.planning import torques
 
@@ -251,7 +245,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
     write_motion(trajectory, out, tau)
     at = np.abs(tau).argmax(axis=0)
     peaks = [
-        {"joint": joint, "tau": float(tau[k, i]), "unit": "N" if i == 3 else "Nm", "at_s": float(trajectory.t[k])}
+        {"joint": joint, "tau": float(tau[k, i]), "unit": LOAD_UNITS[i], "at_s": float(trajectory.t[k])}
         for i, (joint, k) in enumerate(zip(JOINTS, at, strict=True))
     ]
     if as_json:
@@ -296,15 +290,13 @@ def check(
     """
     from planner.files import check_writable
     from planner.motion.motion_files import read_motion
-    from planner.motion.vehicle import load_case
     from planner.planning import examine
 
     check_report(document)
     check_picture(picture)
     check_writable(out, document, picture)
     boom, trajectory = load_boom(boom_file, payload), read_motion(motion)
-    case = None if vehicle is None else load_case(vehicle)
-    move = examine(boom, trajectory, payload_as=payload_as, vehicle=case)
+    move = examine(boom, trajectory, payload_as=payload_as, vehicle=load_vehicle(vehicle))
     written: dict[str, str] = {}
     if out is not None:
         from planner.recording import write_recording

@@ -1,12 +1,15 @@
 """Options that several commands share, and what they stand for."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from boom_model import Boom, InputError
 from planner.paths.targets import HOLDS
+
+if TYPE_CHECKING:
+    from planner.motion.vehicle import VehicleCase
 
 _CATALOGUE = "boom.catalogue"
 
@@ -66,6 +69,13 @@ def load_boom(boom_file: str | None, payload: float | None = None) -> Boom:
     """The boom of --boom and --catalogue, with the payload of --payload."""
     boom = Boom.load(boom_file, given_catalogue())
     return boom if payload is None else boom.with_payload(payload)
+
+
+def load_vehicle(vehicle: str | None) -> "VehicleCase":
+    """The case of --vehicle; else the vehicle rests on level ground."""
+    from planner.motion.vehicle import LEVEL, load_case
+
+    return LEVEL if vehicle is None else load_case(vehicle)
 
 
 def check_picture(picture: str | None) -> None:

@@ -33,7 +33,7 @@ STYLES = {
 
 def print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:
     """Prints a report as tables and sentences or as JSON; returns the exit code."""
-    from planner.checks.motion_checks import Verdict
+    from planner.checks.rows import Verdict
     from planner.reports.report import CERTIFICATE_HEADER, PEAK_HEADER, cells, peak_cells, worst_cells
 
     if as_json:
@@ -54,7 +54,7 @@ def print_report(report: "Report", written: dict[str, str], as_json: bool) -> in
             click.echo(sentence)
         print_lines("Note", report.notes)
         print_lines("Assumed", report.assumptions)
-        print_lines("Would mend it", report.remedies)
+        print_lines("Would mend it", report.suggestions)
         console.print(f"{report.profile}, {report.duration:.3f} s", highlight=False)
         console.print(report.summary, style=STYLES.get(report.verdict), highlight=False, soft_wrap=True)
         print_files(written)

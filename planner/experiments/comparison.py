@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from boom_model import JOINTS, Basis, Boom, InputError, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
-from boom_model.boom import IS_LENGTH
+from boom_model.boom import IS_LENGTH, LOAD_UNITS
 from boom_model.dynamics.newton_euler import PayloadAs
 from planner.motion.motion_files import read_quantities
 from planner.motion.trajectory import Trajectory
@@ -239,7 +239,7 @@ class Comparison:
         joints = []
         for i, joint in enumerate(JOINTS):
             torque: dict[str, Any] = {
-                "unit": "N" if IS_LENGTH[i] else "Nm",
+                "unit": LOAD_UNITS[i],
                 "noise": float(self.torque_noise[i]),
                 "measured_less_planned": _extremes(t, (self.tau_measured - self.tau_planned)[:, i], self.inside),
                 "logged_less_measured": None,

@@ -35,10 +35,12 @@ from boom_model.link_design.beam import Forces
 from boom_model.link_design.exact import buckling_load, pressed
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
+from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Verdict
 from planner.links.loads import largest_components, link_cases, thesis_load
 from planner.motion.trajectory import Trajectory
-from planner.planning import check, plan, plan_each_profile
+from planner.move_spec import MoveSpec
+from planner.planning import check, plan_each_profile, plan_motion
 from planner.progress import Track
 
 E = TypeVar("E", bound=StrEnum)
@@ -323,7 +325,8 @@ def default_moves(boom: Boom, task: LinkTask, track: Track = iter) -> list[Traje
         InputError, InfeasibleError: as `plan`.
     """
     if task.load == LoadFrom.THESIS:
-        return [plan(boom, "transport", "phenotyping", duration=5.0).trajectory]
+        thesis_move = plan_motion(boom, MoveSpec.of("transport", "phenotyping", duration=5.0))
+        return [replace(thesis_move.trajectory, planned=None)]
     return plan_each_profile(boom, "transport", "phenotyping", track)
 
 
@@ -423,6 +426,9 @@ def _stress_check(beam: Beam, H: Array, cases: LoadCases, stresses: Array) -> St
     return StressCheck(float(x), found.elements, float(found.stress[at]), float(own[0, 0]))
 
 
+_MOTOR_TORQUES = (CheckKind.MOTOR_TORQUE, CheckKind.MOTOR_TORQUE_REVERSED, CheckKind.MOTOR_TORQUE_QUASI_STATIC)
+
+
 def _motors(
     before: Boom,
     after: Boom,
@@ -437,15 +443,14 @@ def _motors(
         return []
 
     def judged(boom: Boom, motor: Drive) -> tuple[Verdict, float | None]:
-        drives = tuple(motor if i == joint else d for i, d in enumerate(boom.drives))
         rows = [
             row
             for t in trajectories
-            for row in check(replace(boom, drives=drives), t, payload_as=payload_as).rows
-            if row.joint == JOINTS[joint] and row.check.startswith("motor")
+            for row in check(boom.with_drive(JOINTS[joint], motor), t, payload_as=payload_as).rows
+            if row.joint == JOINTS[joint] and row.kind.part is Part.MOTOR
         ]
         order = [Verdict.INFO, Verdict.PASS, Verdict.WARN, Verdict.NOT_CHECKABLE, Verdict.FAIL]
-        margins = [r.margin for r in rows if r.margin is not None and "torque" in r.check and r.verdict is not Verdict.INFO]
+        margins = [row.margin for row in rows if row.margin is not None and row.kind in _MOTOR_TORQUES]
         return max((row.verdict for row in rows), key=order.index), min(margins, default=None)
 
     choices = []

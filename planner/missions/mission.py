@@ -15,20 +15,20 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from boom_model import BaseMotion, Basis, Boom, InfeasibleError, InputError, Origin, Sourced, forward_kinematics, up_on_slope
+from boom_model import Basis, Boom, InfeasibleError, InputError, Origin, Sourced, forward_kinematics
 from boom_model.arrays import Array, read_only
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.toml_file import Positive, Table, read_toml
 from planner.checks.drives.duty import Duty, trapezoid_weights
 from planner.files import named_file
-from planner.motion.trajectory import STEP, Trajectory, joined, sample
-from planner.motion.vehicle import VehicleCase
-from planner.paths.legs import legs
-from planner.paths.targets import TipTarget, parse_along, parse_hold, parse_joint_velocity, parse_pitch, parse_target, resolve
-from planner.planning import CHECKS_PER_STEP, check
+from planner.motion.trajectory import STEP, Trajectory
+from planner.motion.vehicle import LEVEL, VehicleCase
+from planner.move_spec import MoveSpec
+from planner.paths.targets import TipTarget, parse_hold, parse_joint_velocity, parse_pitch, parse_target, resolve
+from planner.planning import check, plan_motion
 from planner.progress import Track
 from planner.reports.report import Report
-from planner.timing.timing import Profile, Timing, timed
+from planner.timing.profile import JerkLimited, parse_profile
 
 _FOLDER = Path(str(files("planner.missions") / "named_missions"))
 _MOST_STEPS = 100_000
@@ -145,6 +145,7 @@ class Leg:
         old = self.trajectory
         slower = replace(
             old,
+            planned=None,
             t=read_only(old.t * factor),
             qd=read_only(old.qd / factor),
             qdd=read_only(old.qdd / factor**2),
@@ -176,9 +177,12 @@ class Cycle:
         first = [begins[self.order.index(i)] for i in range(len(self.legs))]
         parts = [leg.trajectory for leg in self.legs]
         jerks = [part.qddd for part in parts if part.qddd is not None]
+        q, qd, qdd = (read_only(np.concatenate([getattr(part, name) for part in parts])) for name in ("q", "qd", "qdd"))
         return Trajectory(
             t=read_only(np.concatenate([part.t + begin for part, begin in zip(parts, first, strict=True)])),
-            **{name: read_only(np.concatenate([getattr(part, name) for part in parts])) for name in ("q", "qd", "qdd")},
+            q=q,
+            qd=qd,
+            qdd=qdd,
             qddd=read_only(np.concatenate(jerks)) if len(jerks) == len(parts) else None,
             notes=self.notes,
         )
@@ -213,9 +217,7 @@ class Cycle:
             begin = end
 
 
-def plan_cycle(
-    boom: Boom, mission: Mission, vehicle: VehicleCase | None = None, step: float = STEP, track: Track = iter
-) -> Cycle:
+def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase = LEVEL, step: float = STEP, track: Track = iter) -> Cycle:
     """A mission's legs, planned one after the other, sampled as finely as the checks of a lone move.
 
     Args:
@@ -255,17 +257,17 @@ def plan_cycle(
     return Cycle(mission, tuple(legs), tuple(order), tuple(dict.fromkeys(notes)))
 
 
-def check_steady(vehicle: VehicleCase | None) -> None:
+def check_steady(vehicle: VehicleCase) -> None:
     """A cycle stands on a slope at most.
 
     Raises:
         InputError: the vehicle moves.
     """
-    if vehicle is not None and not vehicle.is_steady:
+    if not vehicle.is_steady:
         raise InputError(f"vehicle case {vehicle.name}: a mission takes a slope alone; check its moves with tracks and shocks")
 
 
-def check_cycle(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None) -> Report:
+def check_cycle(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", vehicle: VehicleCase = LEVEL) -> Report:
     """The checks of a whole cycle: peaks over its legs, means over its time.
 
     Raises:
@@ -296,12 +298,10 @@ def _expanded(steps: list[_Step], where: str) -> Iterator[tuple[str, _Step]]:
 
 
 def _jerk_limited(steps: list[_Step]) -> bool:
-    return any(step.jerk_bound or step.profile == Profile.JERK_LIMITED or _jerk_limited(step.steps) for step in steps)
+    return any(step.jerk_bound or step.profile == JerkLimited.name or _jerk_limited(step.steps) for step in steps)
 
 
-def _leg(
-    boom: Boom, part: _Step, q: Array, vehicle: VehicleCase | None, step: float
-) -> tuple[Leg | None, Array, tuple[str, ...]]:
+def _leg(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -> tuple[Leg | None, Array, tuple[str, ...]]:
     """A step as a leg, None where it moves nothing; where it ends, and what is to be said of it."""
     if part.to is not None:
         return _move(boom, part, q, vehicle, step)
@@ -311,23 +311,29 @@ def _leg(
     return Leg("hold" if powered else "pause", still, moves=False, powered=powered), q, ()
 
 
-def _move(
-    boom: Boom, part: _Step, q: Array, vehicle: VehicleCase | None, step: float
-) -> tuple[Leg | None, Array, tuple[str, ...]]:
-    along, target = parse_along(part.along), parse_target(str(part.to))
-    by_joints = isinstance(along, str) and along == "joint"
+def _move(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -> tuple[Leg | None, Array, tuple[str, ...]]:
+    by_joints = part.along == "joint"
     x, y, z = (float(v) for v in forward_kinematics(boom, q).position)
-    velocities = np.array([parse_joint_velocity(text) for text in part.via_velocity]) if part.via_velocity else None
-    timing = Timing.of(part.profile, part.duration_s, part.jerk_bound, part.average_torque, velocities)
-    targets = (q if by_joints else TipTarget((x, y, z)), *(parse_target(text) for text in part.via), target)
-    pitch, hold = parse_pitch(part.pitch), parse_hold(part.hold)
-    stops = not part.pass_via and velocities is None
-    paths, said = legs(boom, targets, pitch, hold, along, stops, reference=q)
-    if not paths:
+    velocities = [parse_joint_velocity(text) for text in part.via_velocity] or None
+    spec = MoveSpec.of(
+        q if by_joints else TipTarget((x, y, z)),
+        str(part.to),
+        via=part.via,
+        stop_at_via=not part.pass_via,
+        constraint=part.hold,
+        pitch=part.pitch,
+        along=part.along,
+        profile=parse_profile(
+            part.profile, jerk_bound=part.jerk_bound, average_torque=part.average_torque, velocities=velocities
+        ),
+        duration=part.duration_s,
+        vehicle=vehicle,
+        step=step,
+    )
+    planned = plan_motion(boom, spec, reference=q)
+    if not planned.motions:
         return None, q, ()
-    tilt = None if vehicle is None else BaseMotion.of(up=up_on_slope(vehicle.roll, vehicle.pitch))
-    motions = timed(boom, paths, timing, tilt)
-    fine = joined([sample(motion, step / CHECKS_PER_STEP) for motion in motions])
+    fine = planned.fine()
     apart = float(np.abs(fine.q[0] - q).max())
     if apart > _SAME_POSITION:
         raise InfeasibleError(
@@ -336,4 +342,4 @@ def _move(
         )
     way = part.to if by_joints else f"{part.to} along {part.along}"
     label = " ".join([f"to {way}", *(f"via {text}" for text in part.via)])
-    return Leg(label, fine, moves=True, powered=True), fine.q[-1], said
+    return Leg(label, fine, moves=True, powered=True), fine.q[-1], planned.notes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boom_model.arrays import Array
-from boom_model.boom import IS_LENGTH, JOINTS
+from boom_model.boom import IS_LENGTH, JOINTS, LOAD_UNITS
 from boom_model.errors import InputError
 from planner.files import replacing
 from planner.motion.trajectory import (
@@ -30,7 +30,7 @@ FORMS = (".csv", ".parquet", ".yaml", ".yml", ".json")
 _PER = {"q": "", "qd": "/s", "qdd": "/s^2"}
 UNITS = {"t": "s"} | {
     f"{name}{i + 1}": f"{'m' if IS_LENGTH[i] else 'rad'}{per}" for name, per in _PER.items() for i in range(5)
-} | {name: "N" if length else "Nm" for name, length in zip(TORQUES, IS_LENGTH, strict=True)}  # fmt: skip
+} | dict(zip(TORQUES, LOAD_UNITS, strict=True))  # fmt: skip
 """Unit of each column of a motion."""
 
 _ROWS = 20_000  # turned into text at once

@@ -16,6 +16,8 @@ from planner.timing.time_law import Motion
 if TYPE_CHECKING:
     import pyarrow as pa
 
+    from planner.motion.planned import PlannedMotion
+
 STEP = 0.01
 """Default sampling step [s], the thesis's (section 3.5)."""
 
@@ -45,6 +47,9 @@ class Trajectory:
     """Jerk, of a motion that was planned with a limit on it."""
     notes: tuple[str, ...] = ()
     """What a reader of a report must know about where the samples come from."""
+    planned: "PlannedMotion | None" = None
+    """The continuous motion that these samples were taken from: checks look at it between them. None where only the samples
+    are known."""
 
     @staticmethod
     def from_samples(
@@ -71,7 +76,7 @@ class Trajectory:
         for name, array in ready.items():
             if array.shape != (t.size, 5):
                 raise InputError(f"{name} has shape {array.shape}; with {t.size} times it must be ({t.size}, 5)")
-        return Trajectory(t=read_only(t), notes=notes, **ready)
+        return Trajectory(read_only(t), ready["q"], ready["qd"], ready["qdd"], ready.get("qddd"), notes)
 
     @property
     def duration(self) -> float:

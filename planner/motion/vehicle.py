@@ -46,6 +46,21 @@ class VehicleCase:
     """How many such shocks the drives are to survive; None where nobody says."""
 
     @property
+    def is_level(self) -> bool:
+        """Whether the vehicle rests on level ground."""
+        return self.is_steady and self.roll == 0.0 and self.pitch == 0.0
+
+    @property
+    def tilt(self) -> BaseMotion | None:
+        """The slope alone, which planning accounts for; None on level ground."""
+        level = self.roll == 0.0 and self.pitch == 0.0
+        return None if level else BaseMotion.of(up=up_on_slope(self.roll, self.pitch))
+
+    def base(self, t: ArrayLike) -> BaseMotion | None:
+        """`base_motion` at times t (n,); None at rest on level ground."""
+        return None if self.is_level else base_motion(self, t)
+
+    @property
     def is_steady(self) -> bool:
         """Whether it is a tilt alone, which does not change with time."""
         return (self.amplitude == 0.0 or self.speed == 0.0) and self.peak == 0.0
@@ -62,6 +77,10 @@ class VehicleCase:
             parts.append(f"shock: half-sine of {self.peak:g} m/s^2 for {self.shock_duration:g} s from {self.shock_start:g} s")
         said = "; ".join(parts) or "level ground, at rest"
         return f"vehicle case {self.name}: {said} ({self.origin.basis}: {self.origin.source})"
+
+
+LEVEL = VehicleCase("level ground", Origin(Basis.PRINTED, "the vehicle rests on level ground"))
+"""What a move is planned and checked on where no other case is given."""
 
 
 def base_motion(case: VehicleCase, t: ArrayLike) -> BaseMotion:

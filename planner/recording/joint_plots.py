@@ -6,7 +6,7 @@ import numpy as np
 
 from boom_model import JOINTS, Basis, Boom, Breakdown, Loads
 from boom_model.arrays import Array
-from boom_model.boom import IS_LENGTH, Mount
+from boom_model.boom import IS_LENGTH, LOAD_UNITS, Mount
 from boom_model.drives.drive import drive_inertia, drive_torque_limit
 from planner.motion.trajectory import Trajectory
 from planner.recording.palette import (
@@ -83,8 +83,8 @@ def torque_plots(boom: Boom, trajectory: Trajectory, tau: Array) -> Iterator[Plo
             own = drive_inertia(drive) * trajectory.qdd[:, i]
             limits = {"drive's lower limit": -limit - own, "drive's upper limit": limit - own}
         basis = Basis.weakest([Basis.ESTIMATED, *([] if drive is None else [o.basis for o in drive.supply_origins])])
-        name, unit = ("force", "N") if IS_LENGTH[i] else ("torque", "Nm")
-        yield Plot(f"plots/tau/{joint}", f"{joint} {name}", unit, JOINT_COLORS[joint], tau[:, i], limits, basis)
+        name = "force" if IS_LENGTH[i] else "torque"
+        yield Plot(f"plots/tau/{joint}", f"{joint} {name}", LOAD_UNITS[i], JOINT_COLORS[joint], tau[:, i], limits, basis)
 
 
 def ratio_bundles(ratios: dict[str, Array]) -> list[Bundle]:
@@ -102,7 +102,7 @@ def part_bundles(parts: Breakdown) -> Iterator[Bundle]:
     """Each joint's torque in parts that add up to it."""
     names, each, total = [*PART_COLORS, "total"], [getattr(parts, name) for name in PART_COLORS], parts.total
     for i, joint in enumerate(JOINTS):
-        unit = "N" if IS_LENGTH[i] else "Nm"
+        unit = LOAD_UNITS[i]
         values = np.stack([part[:, i] for part in (*each, total)], axis=-1)
         yield Bundle(f"plots/parts/{joint}", f"{joint} [{unit}]", names, [*PART_COLORS.values(), TOTAL_COLOR], values)
 

@@ -54,7 +54,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
     """
-    boom, trajectory, loads, report = move.boom, move.trajectory, move.loads, move.report
+    boom, trajectory, loads, report = move.boom, move.trajectory, move.loads, move.full_report
     ratios = torque_ratios(boom, trajectory, loads.tau)
     torques: list[Plot | Bundle] = [*joint_plots.torque_plots(boom, trajectory, loads.tau), *joint_plots.ratio_bundles(ratios)]
     joints = {

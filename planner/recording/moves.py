@@ -44,7 +44,7 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
     """
     if not moves:
         raise InputError("no move to record")
-    if any(move.vehicle is not None for move in moves.values()):
+    if any(not move.vehicle.is_level for move in moves.values()):
         raise InputError("moves on a vehicle cannot share a mount: record each by itself")
     longest = max(moves.values(), key=lambda move: move.trajectory.duration)
     colors = dict(zip(moves, cycle(MOVE_COLORS), strict=False))

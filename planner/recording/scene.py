@@ -49,7 +49,7 @@ def log_mount(recording: rr.RecordingStream, t: Array, vehicle: VehicleCase | No
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     plate = boxes(np.array([[-0.2, -0.2, -0.02]]), np.array([[0.2, 0.2, 0.0]]), PIN_COLOR)
     recording.log("world/mount", plate, rr.CoordinateFrame("mount"), static=True)
-    T = np.eye(4)[None] if vehicle is None else base_pose(vehicle, t)
+    T = np.eye(4)[None] if vehicle is None or vehicle.is_level else base_pose(vehicle, t)
     _log_poses(recording, "world/mount", T, "tf#/world", "mount", t[: len(T)])
 
 

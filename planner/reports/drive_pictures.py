@@ -10,6 +10,7 @@ import numpy as np
 from boom_model import JOINTS, Boom, Drive, InputError, tip_deflection
 from boom_model.arrays import Array
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
+from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Row, Verdict
 from planner.files import replacing
 from planner.motion.trajectory import Trajectory
@@ -130,7 +131,7 @@ def _drive(
     shown: Sequence[slice],
 ) -> None:
     plane, gearbox, margins = panels
-    rows = [row for row in report.rows if row.joint == JOINTS[i] and row.check.startswith(("gearbox", "motor"))]
+    rows = [row for row in report.rows if row.joint == JOINTS[i] and row.kind.part in (Part.GEARBOX, Part.MOTOR)]
     _plane(plane, drive, JOINTS[i], tau[:, i], trajectory.qd[:, i], trajectory.qdd[:, i], rows)
     _gearbox(gearbox, drive, JOINTS[i], trajectory.t, tau[:, i], shown, rows)
     _margins(margins, JOINTS[i], rows)
@@ -139,7 +140,7 @@ def _drive(
 def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: Array, rows: Sequence[Row]) -> None:
     speed = drive.gearbox.ratio * np.abs(qd)
     for sign, color, name in ((1.0, _THERE, "the motion"), (-1.0, _BACK, "the same backwards")):
-        if sign < 0.0 and not any(row.check == "motor torque, reversed" for row in rows):
+        if sign < 0.0 and not any(row.kind is CheckKind.MOTOR_TORQUE_REVERSED for row in rows):
             continue
         torque = motor_torque(drive, tau, sign * qd, qdd)
         if torque is not None:
@@ -178,7 +179,7 @@ def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts
     for name, value, color in ratings:
         if value is not None:
             axes.axhline(value, color=color, linewidth=1.5, label=f"{name} {value:g} Nm")
-    average = next((row.demand for row in rows if row.check == "gearbox average"), None)
+    average = next((row.demand for row in rows if row.kind is CheckKind.GEARBOX_AVERAGE), None)
     if average is not None:
         axes.axhline(average, color=_CURVE, linestyle="--", label=f"average of the cycle {average:.0f} Nm")
     axes.set(title=f"{joint}: {gear.name}", ylabel="gearbox torque, size [Nm]")

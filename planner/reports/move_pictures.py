@@ -6,7 +6,7 @@ import numpy as np
 
 from boom_model import JOINTS, Boom
 from boom_model.arrays import Array
-from boom_model.boom import IS_LENGTH
+from boom_model.boom import IS_LENGTH, LOAD_UNITS
 from boom_model.drives.drive import drive_inertia, drive_torque_limit
 from planner.motion.trajectory import Trajectory
 
@@ -27,20 +27,47 @@ def move_pictures(boom: Boom, motion: Trajectory, tau: Array) -> dict[str, "Figu
     }
 
 
+def move_figure(boom: Boom, motion: Trajectory, tau: Array) -> "Figure":
+    """One figure of positions, velocities and torques (n, 5), a column for each joint, with their limits."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(16.0, 8.0), dpi=90, layout="constrained")
+    FigureCanvasAgg(figure)
+    rows = figure.subplots(3, 5, sharex=True)
+    for axes in rows.ravel():
+        axes.grid(alpha=0.3, linewidth=0.5)
+    limits = boom.limits
+    _draw(list(rows[0]), motion, "position", "", motion.q, limits.lower, limits.upper)
+    _draw(list(rows[1]), motion, "velocity", "/s", motion.qd, -limits.velocity, limits.velocity)
+    _draw_torques(list(rows[2]), boom, motion, tau)
+    figure.supxlabel("t [s]")
+    return figure
+
+
 def _figure(motion: Trajectory, name: str, per: str, values: Array, lower: Array, upper: Array) -> "Figure":
     figure, panels = _panels()
+    _draw(panels, motion, name, per, values, lower, upper)
+    return figure
+
+
+def _torques(boom: Boom, motion: Trajectory, tau: Array) -> "Figure":
+    figure, panels = _panels()
+    _draw_torques(panels, boom, motion, tau)
+    return figure
+
+
+def _draw(panels: list["Axes"], motion: Trajectory, name: str, per: str, values: Array, lower: Array, upper: Array) -> None:
     for i, (joint, axes) in enumerate(zip(JOINTS, panels, strict=True)):
         scale, unit = (1.0, "m") if IS_LENGTH[i] else (180.0 / np.pi, "deg")
         axes.plot(motion.t, values[:, i] * scale, color=_VALUE)
         for bound in (lower[i], upper[i]):
             axes.axhline(bound * scale, color=_LIMIT, linewidth=1.0, linestyle="--")
         axes.set_title(f"{joint} {name} [{unit}{per}]", fontsize=9)
-    return figure
 
 
-def _torques(boom: Boom, motion: Trajectory, tau: Array) -> "Figure":
+def _draw_torques(panels: list["Axes"], boom: Boom, motion: Trajectory, tau: Array) -> None:
     """Torque of each joint with what its drive leaves for it at that time, -T - J qdd to T - J qdd."""
-    figure, panels = _panels()
     for i, (joint, axes) in enumerate(zip(JOINTS, panels, strict=True)):
         axes.plot(motion.t, tau[:, i], color=_VALUE)
         drive = boom.drives[i]
@@ -50,9 +77,8 @@ def _torques(boom: Boom, motion: Trajectory, tau: Array) -> "Figure":
             own, note = drive_inertia(drive) * motion.qdd[:, i], ""
             for bound in (limit - own, -limit - own):
                 axes.plot(motion.t, bound, color=_LIMIT, linewidth=1.0, linestyle="--")
-        name, unit = ("force", "N") if IS_LENGTH[i] else ("torque", "Nm")
+        name, unit = "force" if IS_LENGTH[i] else "torque", LOAD_UNITS[i]
         axes.set_title(f"{joint} {name} [{unit}]{note}", fontsize=9)
-    return figure
 
 
 def _panels() -> tuple["Figure", list["Axes"]]:

@@ -1,18 +1,21 @@
 """A motion's report: its rows, what was assumed, and the verdict."""
 
 from dataclasses import asdict, dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from boom_model import JOINTS, Basis, Boom, Breakdown
 from boom_model.arrays import Array
-from boom_model.boom import IS_LENGTH
+from boom_model.boom import IS_LENGTH, LOAD_UNITS
 from planner.checks.certificate import Certificate, WorstRatio
-from planner.checks.motion_checks import ANGLE_CHECKS
+from planner.checks.kinds import Margin
 from planner.checks.rows import Row, Verdict, overall
 from planner.checks.stopping import WorstStop
 from planner.reports.markdown import section, table
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 
 @dataclass(frozen=True)
@@ -31,18 +34,22 @@ class TorquePeak:
     total: float
 
 
-def torque_peaks(t: Array, parts: Breakdown) -> tuple[TorquePeak, ...]:
-    """The largest |torque| of each joint over times t (n,), in parts."""
+def torque_peaks(at: Array, parts: Breakdown) -> tuple[TorquePeak, ...]:
+    """The largest torque of each joint, in parts.
+
+    Args:
+        at: (5,) time of each joint's peak.
+        parts: (5, 5) at those times; the diagonal is each joint's own.
+    """
     total = parts.total
     peaks = []
-    for i, at in enumerate(np.abs(total).argmax(axis=0)):
-        shares = {field.name: float(getattr(parts, field.name)[at, i]) for field in fields(parts)}
-        unit = "N" if IS_LENGTH[i] else "Nm"
-        peaks.append(TorquePeak(joint=JOINTS[i], unit=unit, at_s=float(t[at]), total=float(total[at, i]), **shares))
+    for i, joint in enumerate(JOINTS):
+        shares = {field.name: float(getattr(parts, field.name)[i, i]) for field in fields(parts)}
+        peaks.append(TorquePeak(joint=joint, unit=LOAD_UNITS[i], at_s=float(at[i]), total=float(total[i, i]), **shares))
     return tuple(peaks)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Report:
     """What was checked, and what came of it."""
 
@@ -60,13 +67,18 @@ class Report:
     """Of a planned motion: the worst ratio to each limit, recomputed; None of a recorded one."""
     stop: WorstStop | None = None
     """Of a planned motion: the longest and the farthest stop on its way."""
-    remedies: tuple[str, ...] = ()
-    """Single changes that would mend a motion that fails, as far as they were looked for."""
+    suggestions: tuple[str, ...] = ()
+    """Single changes that would make a failing motion possible, as far as they were looked for."""
 
     @property
     def verdict(self) -> Verdict:
         """FAIL where a row fails or the certificate finds a limit broken, else that of the rows."""
         return Verdict.FAIL if self.certificate is not None and self.certificate.broken else overall(self.rows)
+
+    def verdict_of(self, joint: str) -> Verdict:
+        """The verdict of one joint's rows and of the certificate's limits on it."""
+        broken = self.certificate is not None and any(worst.joint == joint for worst in self.certificate.broken)
+        return Verdict.FAIL if broken else overall(row for row in self.rows if row.joint == joint)
 
     @property
     def summary(self) -> str:
@@ -101,15 +113,27 @@ class Report:
             "profile": self.profile,
             "duration_s": self.duration,
             "verdict": self.verdict,
-            "checks": [asdict(row) for row in self.rows],
+            "checks": [row.to_json() for row in self.rows],
             "notes": list(self.notes),
             "assumptions": list(self.assumptions),
             "torque_peaks": [asdict(peak) for peak in self.peaks],
             "certificate": None if self.certificate is None else asdict(self.certificate),
             "stop": None if self.stop is None else asdict(self.stop),
-            "remedies": list(self.remedies),
+            "remedies": list(self.suggestions),
             "files": files,
         }
+
+    def to_table(self) -> "pa.Table":
+        """The rows as a table in SI, with the columns of the JSON's checks."""
+        import pyarrow as pa
+
+        texts, numbers = ("joint", "check", "unit", "verdict", "basis", "source"), ("demand", "limit", "margin")
+        types = dict.fromkeys(texts, pa.string()) | dict.fromkeys((*numbers, "required_margin", "at_s"), pa.float64())
+        order = ("joint", "check", *numbers[:2], "unit", "margin", "required_margin", "at_s", "verdict", "basis", "source")
+        return pa.Table.from_pylist([row.to_json() for row in self.rows], schema=pa.schema([(n, types[n]) for n in order]))
+
+    def __repr__(self) -> str:
+        return f"Report({self.profile}, {self.duration:.3f} s, {len(self.rows)} rows, {self.verdict})"
 
     def to_markdown(self) -> str:
         """The report as Markdown, in people's units."""
@@ -121,17 +145,17 @@ class Report:
         if self.certificate is not None:
             lines += ["", "## Certificate", "", *table(CERTIFICATE_HEADER, map(worst_cells, self.certificate.worst))]
         lines += [f"\n{sentence}" for sentence in self.sentences]
-        for title, texts in (("Would mend it", self.remedies), ("Notes", self.notes), ("Assumed", self.assumptions)):
+        for title, texts in (("Would mend it", self.suggestions), ("Notes", self.notes), ("Assumed", self.assumptions)):
             lines += section(title, texts)
         return "\n".join(lines) + "\n"
 
 
 def cells(row: Row) -> tuple[str, ...]:
     """A row for people: joint, check, demand, limit, margin, required margin, time, verdict, basis."""
-    factor, unit = _for_people(row)
+    factor, unit = row.shown_unit.per_si, row.shown_unit.name
     if row.margin is None:
         margin = "-"
-    elif row.check in ANGLE_CHECKS or row.joint == "arm":
+    elif row.kind.margin is Margin.DISTANCE:
         margin = f"{row.margin * factor:.4g} {unit}"
     else:
         margin = f"{round(row.margin, 2) + 0.0:.0%}"  # no -0%
@@ -168,20 +192,6 @@ def peak_cells(peak: TorquePeak) -> tuple[str, ...]:
     """A torque peak for people, under PEAK_HEADER."""
     parts = (peak.gravity, peak.inertia, peak.velocity, peak.payload, peak.friction, peak.vehicle)
     return (peak.joint, f"{peak.at_s:.2f} s", f"{peak.total:.2f} {peak.unit}", *(f"{part:.2f}" for part in parts))
-
-
-def _for_people(row: Row) -> tuple[float, str]:
-    if row.unit == "rad/s" and row.check.startswith(("motor", "gearbox", "actuator")):
-        return 60.0 / (2.0 * np.pi), "rpm"
-    if row.unit == "rad" and row.check.startswith("gearbox"):
-        return 1e3, "mrad"
-    if row.joint == "tip" and row.unit == "m":
-        return 1e3, "mm"
-    if row.check == "gearbox life":
-        return 1.0 / 3600.0, "h"
-    if row.unit.startswith("rad"):
-        return 180.0 / np.pi, row.unit.replace("rad", "deg")
-    return 1.0, row.unit
 
 
 def assumptions(boom: Boom, jerk_limited: bool) -> tuple[str, ...]:

@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 
 from boom_model import JOINTS, InputError
+from planner.checks.kinds import DRIVE_PARTS
 from planner.checks.rows import Row
 from planner.reports.markdown import section, table
 from planner.reports.report import Report, cells
 
 _BESIDES = ("mount", "tip")
-_DRIVE_CHECKS = ("gearbox", "motor", "actuator", "drive", "power-off")
 
 
 def compared(reports: Mapping[str, Report], joints: Sequence[str]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -32,7 +32,8 @@ def compared(reports: Mapping[str, Report], joints: Sequence[str]) -> tuple[tupl
     header = ("joint", "check", *(text for name in reports for text in (f"{name}: demand of limit", "margin, verdict")))
     rows = []
     for (joint, check), found in by_check.items():
-        if joint in _BESIDES or check.startswith(_DRIVE_CHECKS):
+        kind = next(iter(found.values())).kind
+        if joint in _BESIDES or kind.part in DRIVE_PARTS:
             rows.append((joint, check, *(text for name in reports for text in _pair(found.get(name)))))
     return header, rows
 

@@ -1,7 +1,7 @@
 """Which motor, wiring, voltage and gearbox would do for a joint: the whole catalogue held against a mission."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import islice
 
@@ -23,20 +23,15 @@ from boom_model import (
 from boom_model.arrays import scalar
 from boom_model.boom import IS_LENGTH
 from boom_model.dynamics.newton_euler import PayloadAs
-from planner.checks.drives.actuator import actuator_rows
+from planner.bisection import bisect
 from planner.checks.drives.joint_view import JointView
+from planner.checks.evaluation import at_samples
+from planner.checks.kinds import Part, Severity
 from planner.checks.motion_checks import drive_rows, joint_views
 from planner.checks.rows import Row, Verdict, overall
 from planner.missions.mission import Cycle, Mission, check_steady, plan_cycle
-from planner.motion.vehicle import VehicleCase, base_motion
-from planner.planning import torques
+from planner.motion.vehicle import LEVEL, VehicleCase
 from planner.progress import Track
-
-POWER_OFF = "power-off hold"
-"""The brake's matter, whatever drive it holds: left out of the choice."""
-
-GUIDES = ("gearbox resonance", "motor inertia ratio", "motor resonance dwell", "motor against gearbox")
-"""Checks against rules of thumb, which warn and do not fail: they do not rank."""
 
 LARGEST_STRETCH = 8.0
 """A mission whose moves would have to be slower than this many times is not rescaled."""
@@ -94,14 +89,15 @@ class Judged:
 
     @property
     def by_room(self) -> tuple[Row, ...]:
-        """The rows with a limit that can fail, the one with the least to spare beyond its required margin first."""
+        """The rows with a limit that can FAIL, no guidelines; the least room beyond the required margin first."""
         held = (Verdict.PASS, Verdict.WARN, Verdict.FAIL)
-        limited = (r for r in self.rows if r.margin is not None and r.verdict in held and r.check not in GUIDES)
+        ranking = (row for row in self.rows if row.kind.severity is not Severity.GUIDELINE)
+        limited = (row for row in ranking if row.margin is not None and row.verdict in held)
         return tuple(sorted(limited, key=room))
 
-    def tightest(self, part: str = "") -> Row | None:
-        """The first of them whose check begins with `part`."""
-        return next((row for row in self.by_room if row.check.startswith(part)), None)
+    def tightest(self, part: Part | None = None) -> Row | None:
+        """The first of them, of one part of the drive where that is given."""
+        return next((row for row in self.by_room if part is None or row.kind.part == part), None)
 
     @property
     def mass(self) -> float | None:
@@ -162,7 +158,7 @@ def size(
     *,
     adapt: Adapt = Adapt.NOTHING,
     payload_as: PayloadAs = "mass",
-    vehicle: VehicleCase | None = None,
+    vehicle: VehicleCase = LEVEL,
 ) -> tuple[Judged, ...]:
     """Each drive on a joint, the others as they are: what does not fail, by mass and then by margin; what fails behind.
 
@@ -237,7 +233,7 @@ def choose(
     adapt: Adapt = Adapt.NOTHING,
     payload_as: PayloadAs = "mass",
     track: Track = iter,
-    vehicle: VehicleCase | None = None,
+    vehicle: VehicleCase = LEVEL,
 ) -> tuple[Choice, ...]:
     """The catalogue for each joint of each boom, on the same cycle or, with Adapt.REPLAN, on the same mission.
 
@@ -261,15 +257,8 @@ def choose(
     )
 
 
-def with_drive(boom: Boom, joint: str, drive: Drive | LinearDrive) -> Boom:
-    """The boom with another drive on a joint."""
-    if isinstance(drive, LinearDrive):
-        return replace(boom, actuator=drive)
-    return replace(boom, drives=tuple(drive if name == joint else old for name, old in zip(JOINTS, boom.drives, strict=True)))
-
-
 def fitted(
-    boom: Boom, work: Cycle | Mission, joint: str, payload_as: PayloadAs = "mass", vehicle: VehicleCase | None = None
+    boom: Boom, work: Cycle | Mission, joint: str, payload_as: PayloadAs = "mass", vehicle: VehicleCase = LEVEL
 ) -> Judged | None:
     """The drive that a joint has, held against a cycle, or against a mission that is planned for it; None where it has none.
 
@@ -346,7 +335,7 @@ class _Load:
     """What loads the joints besides the boom and its motion."""
 
     payload_as: PayloadAs
-    vehicle: VehicleCase | None
+    vehicle: VehicleCase
 
 
 def _mission(work: Cycle | Mission) -> Mission:
@@ -360,19 +349,14 @@ def _planned(work: Cycle | Mission) -> Cycle:
 
 
 def _view(boom: Boom, cycle: Cycle, joint: str, load: _Load) -> JointView:
-    motion, vehicle = cycle.trajectory, load.vehicle
-    base = None if vehicle is None else base_motion(vehicle, motion.t)
-    bases = () if vehicle is None else (vehicle.origin.basis,)
-    tau = torques(boom, motion, load.payload_as, vehicle)
-    return joint_views(boom, motion, tau, base=base, payload_as=load.payload_as, bases=bases, duty=cycle.duty)[_index(joint)]
+    evaluation = at_samples(boom, cycle.trajectory, vehicle=load.vehicle, payload_as=load.payload_as, reactions=False)
+    return joint_views(evaluation, cycle.duty)[_index(joint)]
 
 
 def _judged(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, view: JointView) -> Judged:
-    if isinstance(drive, LinearDrive):
-        rows = actuator_rows(view, drive, float(boom.limits.lower[view.index]))
-    else:
-        rows = drive_rows(view, drive, None)
-    kept = tuple(row for row in rows if row.check != POWER_OFF)
+    rows = drive_rows(view, drive, retracted=float(boom.limits.lower[view.index]))
+    # A brake holds without power whatever drive it is on: no matter of this choice.
+    kept = tuple(row for row in rows if row.kind.part is not Part.BRAKE)
     moving = sum(n * leg.trajectory.duration for leg, n in zip(cycle.legs, cycle.counts, strict=True) if leg.moves)
     return Judged(joint, drive, kept, cycle.duty.duration, float(moving))
 
@@ -387,19 +371,17 @@ def _rescaled(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, 
     slowest = slowed(LARGEST_STRETCH)
     if slowest.fails:
         return slowest
-    low, high, best = 1.0, LARGEST_STRETCH, slowest
-    for _ in range(_STRETCH_STEPS):
-        if high - low < 0.01:
-            break
-        middle = (low + high) / 2.0
-        judged = slowed(middle)
-        low, high = (middle, high) if judged.fails else (low, middle)
-        best = best if judged.fails else judged
-    return best
+    tried = {LARGEST_STRETCH: slowest}
+
+    def does(factor: float) -> bool:
+        tried[factor] = slowed(factor)
+        return not tried[factor].fails
+
+    return tried[bisect(does, good=LARGEST_STRETCH, bad=1.0, steps=_STRETCH_STEPS, within=0.01)]
 
 
 def _replanned(boom: Boom, mission: Mission, joint: str, drive: Drive | LinearDrive, load: _Load) -> Judged:
-    other = with_drive(boom, joint, drive)
+    other = boom.with_drive(joint, drive)
     try:
         cycle = plan_cycle(other, mission, load.vehicle)
     except InfeasibleError as error:

@@ -1,14 +1,14 @@
 """What the choice of drives came to, as tables for people."""
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from itertools import groupby
 from typing import Any
 
 from boom_model import LinearDrive
 from boom_model.drives.drive import STEPPER_MARGIN
+from planner.checks.kinds import Part
 from planner.checks.rows import Row, Verdict
-from planner.motion.vehicle import VehicleCase
+from planner.motion.vehicle import LEVEL, VehicleCase
 from planner.reports.markdown import section, table
 from planner.reports.report import cells
 from planner.sizing.choice import Adapt, Choice, Judged
@@ -20,7 +20,7 @@ _SHAPED = {
     "slowed where it fails; --adapt replan plans for each",
     Adapt.REPLAN: "every drive is judged on a motion that was planned for it, the other joints' drives as they are fitted",
 }
-_LEVEL = "level ground; --vehicle gives a slope, and shocks are checked move by move"
+_LEVEL_GROUND = "level ground; --vehicle gives a slope, and shocks are checked move by move"
 _STUCK = (
     "no motion was found with any drive; the other joints keep their fitted ones, and where one of those is what cannot, "
     "it has to be replaced first, in a boom file of your own"
@@ -36,8 +36,8 @@ def ranking(choice: Choice) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     rows: list[tuple[str, ...]] = []
     for place, judged in enumerate(choice.judged, start=1):
         mass = "-" if judged.mass is None else f"{judged.mass:.1f} kg"
-        parts = ("actuator", "-") if isinstance(judged.drive, LinearDrive) else ("gearbox", "motor")
-        spare = ["-" if judged.fails else _margin(judged.tightest(part)) for part in parts]
+        parts = (Part.ACTUATOR, None) if isinstance(judged.drive, LinearDrive) else (Part.GEARBOX, Part.MOTOR)
+        spare = ["-" if judged.fails or part is None else _margin(judged.tightest(part)) for part in parts]
         warned = ", ".join(check for check in judged.warned if check not in choice.warned) or "-"
         facts = ("-" if judged.fails else str(place), judged.name, judged.supply, mass, *spare, warned)
         cycle = "-" if judged.infeasible else f"{judged.moving:.1f} of {judged.duration:.0f} s"
@@ -134,12 +134,12 @@ def _judged_json(judged: Judged) -> dict[str, Any]:
         "cycle_s": None if judged.infeasible else judged.duration,
         "moving_s": None if judged.infeasible else judged.moving,
         "infeasible": judged.infeasible,
-        "checks": [asdict(row) for row in judged.rows],
+        "checks": [row.to_json() for row in judged.rows],
     }
 
 
 def sizing_notes(
-    choices: Sequence[Choice], adapt: Adapt = Adapt.NOTHING, vehicle: VehicleCase | None = None, left_out: Sequence[str] = ()
+    choices: Sequence[Choice], adapt: Adapt = Adapt.NOTHING, vehicle: VehicleCase = LEVEL, left_out: Sequence[str] = ()
 ) -> tuple[str, ...]:
     """What a reader of the tables must know.
 
@@ -163,7 +163,7 @@ def sizing_notes(
         "least margin beyond the required one",
         "power-off is the brake's matter and left out; see the mission's own report",
         _SHAPED[adapt],
-        _LEVEL if vehicle is None else vehicle.sentence,
+        _LEVEL_GROUND if vehicle is LEVEL else vehicle.sentence,
         *sorted({_tolerance(judged) for choice in choices for judged in choice.judged} - {""}),
     ]
     notes += [f"no drive is known to pass, for want of data: {unknown}"] if unknown else []
@@ -202,5 +202,5 @@ def _short(judged: Judged | None) -> str:
     if judged is None:
         return "-"
     if not judged.fails:
-        return f"no FAIL; {_margin(judged.tightest('motor') or judged.tightest())}"
+        return f"no FAIL; {_margin(judged.tightest(Part.MOTOR) or judged.tightest())}"
     return "FAIL: no motion" if judged.first_failing is None else f"FAIL: {_margin(judged.first_failing)}"

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 
 import numpy as np
 
@@ -12,64 +11,44 @@ from planner.checks.certificate import WorstRatio, certify
 from planner.paths.clearance import require_path_clear
 from planner.paths.path import JointLine, Path, SplinePath
 from planner.timing.path_limits import jerk_stretch, least_stretch, looks, shares
-from planner.timing.time_law import Motion, TimeLaw
+from planner.timing.profile import Cubic, Profile, TimingProfile, parse_profile
+from planner.timing.time_law import Motion
+
+__all__ = ["Profile", "Timing", "timed"]
 
 _ROUNDING = 1e-9
-
-
-class Profile(StrEnum):
-    """How a path is timed."""
-
-    CUBIC = "cubic"
-    QUINTIC = "quintic"
-    TRAPEZOIDAL = "trapezoidal"
-    JERK_LIMITED = "jerk-limited"
-    TIME_OPTIMAL = "time-optimal"
 
 
 @dataclass(frozen=True, eq=False)
 class Timing:
     """What is asked of a motion's timing."""
 
-    profile: Profile = Profile.CUBIC
+    profile: TimingProfile
     duration: float | None = None
     """[s]; None is the least."""
-    jerk_bound: bool = False
-    """Hold the time-optimal law to the jerk limits as well."""
-    average_torque: bool = False
-    """Hold the time-optimal law to the gearboxes' average torque as well."""
-    velocities: Array | None = None
-    """(k, 5) of the cubic at its waypoints; None makes its acceleration continuous."""
     rate: float | None = None
     """[Hz] of a controller, on whose clock the motion and its parts end."""
 
     @staticmethod
     def of(
-        profile: str,
+        profile: str | TimingProfile,
         duration: float | None = None,
         jerk_bound: bool = False,
         average_torque: bool = False,
         velocities: Array | None = None,
         rate: float | None = None,
     ) -> "Timing":
-        """Timing, checked.
+        """Timing, checked. The options beside a profile's word are those of `parse_profile`.
 
         Raises:
             InputError: no such profile, not a positive number, or an option of another profile.
         """
-        try:
-            known = Profile(profile)
-        except ValueError:
-            raise InputError(f"profile is {profile!r}; there are: {', '.join(Profile)}") from None
+        if not isinstance(profile, TimingProfile):
+            profile = parse_profile(profile, jerk_bound=jerk_bound, average_torque=average_torque, velocities=velocities)
         for name, value, unit in (("duration", duration, "s"), ("rate", rate, "Hz")):
             if value is not None and not scalar(name, value) > 0.0:
                 raise InputError(f"{name} is {value:g} {unit}; it must be above 0 {unit}")
-        for name, given in (("jerk_bound", jerk_bound), ("average_torque", average_torque)):
-            if given and known is not Profile.TIME_OPTIMAL:
-                raise InputError(f"{name} is for the time-optimal profile, not for {known}")
-        if velocities is not None and known is not Profile.CUBIC:
-            raise InputError(f"velocities at waypoints are for the cubic profile, not for {known}")
-        return Timing(known, duration, jerk_bound, average_torque, velocities, rate)
+        return Timing(profile, duration, rate)
 
 
 def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | None) -> tuple[Motion, ...]:
@@ -78,8 +57,8 @@ def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | 
     Raises:
         InfeasibleError: the duration is too short, no motion keeps the drives' limits, or it comes too near to a shape.
     """
-    if timing.velocities is not None:
-        return (_with_velocities(boom, paths, timing, base),)
+    if isinstance(timing.profile, Cubic) and timing.profile.velocities is not None:
+        return (_with_velocities(boom, paths, timing, timing.profile.velocities, base),)
     motions = [_least(boom, path, timing, base) for path in paths]
     least = sum(motion.duration for motion in motions)
     asked = least if timing.duration is None else timing.duration
@@ -99,14 +78,8 @@ def _slowed(motion: Motion, factor: float) -> Motion:
 
 def _least(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> Motion:
     """The profile's least-time motion, slowed by what its own look at the path missed."""
-    if timing.profile is Profile.CUBIC and isinstance(path, SplinePath):
-        from planner.timing.profiles.cubic_through import cubic_through
-
-        motion = cubic_through(boom, path.waypoints, base)
-        require_path_clear(boom, motion.path)  # another path than the one that was looked at
-    else:
-        motion = Motion(path, _law(boom, path, timing, base))
-    if isinstance(path, JointLine) and timing.profile is not Profile.TIME_OPTIMAL:
+    motion = timing.profile.motion(boom, path, base)
+    if isinstance(path, JointLine) and timing.profile.exact_on_lines:
         return motion
     samples = looks(motion.path)
     missed = least_stretch(boom, motion.path, motion.law, base, samples)
@@ -115,51 +88,15 @@ def _least(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> M
     return _slowed(motion, max(1.0, missed))
 
 
-def _law(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> TimeLaw:
-    """Each profile's third-party library is imported where it is used: they are slow to import."""
-    match timing.profile:
-        case Profile.CUBIC:
-            from planner.timing.profiles.cubic import cubic
-
-            return cubic(boom, path, base)
-        case Profile.QUINTIC:
-            from planner.timing.profiles.quintic import quintic
-
-            return quintic(boom, path, base)
-        case Profile.TRAPEZOIDAL:
-            from planner.timing.profiles.trapezoidal import trapezoidal
-
-            return trapezoidal(boom, path, base)
-        case Profile.JERK_LIMITED:
-            from planner.timing.profiles.jerk_limited import jerk_limited
-
-            return jerk_limited(boom, path, base)
-        case Profile.TIME_OPTIMAL:
-            from planner.timing.profiles.average_torque import within_average_torque
-            from planner.timing.profiles.time_optimal import time_optimal, with_jerk_bound
-
-            law = within_average_torque(boom, path, base) if timing.average_torque else time_optimal(boom, path, base)
-            if not timing.jerk_bound:
-                return law
-            smooth = with_jerk_bound(boom, path, law, base)
-            if timing.average_torque:
-                return smooth
-            from planner.timing.profiles.jerk_limited import evenly_limited
-
-            return min(smooth, evenly_limited(boom, path, base)[0], key=lambda each: each.duration)
-
-
-def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | None) -> Motion:
+def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, velocities: Array, base: BaseMotion | None) -> Motion:
     from planner.timing.profiles.cubic_through import cubic_with_velocities
 
-    velocities = timing.velocities
     path = paths[0] if len(paths) == 1 else None
     count = len(path.waypoints) - 2 if isinstance(path, SplinePath) else 0
-    if velocities is None or not isinstance(path, SplinePath) or velocities.shape != (count, 5):
-        given = None if velocities is None else velocities.shape
+    if not isinstance(path, SplinePath) or velocities.shape != (count, 5):
         raise InputError(
-            f"velocities have shape {given}; with {count} waypoints, without those where the move already is, it must be "
-            f"({count}, 5)"
+            f"velocities have shape {velocities.shape}; with {count} waypoints, without those where the move already is, it "
+            f"must be ({count}, 5)"
         )
     motion = cubic_with_velocities(boom, path.waypoints, velocities, timing.duration, base)
     if timing.rate is not None:
@@ -174,7 +111,7 @@ def _too_short(
 ) -> str:
     """How far a duration is from the least, and which limit it would break most."""
     hasty = [_slowed(motion, asked / least) for motion in motions]
-    worst = max(certify(boom, hasty, base, timing.average_torque).worst, key=lambda each: each.ratio)
+    worst = max(certify(boom, hasty, base, timing.profile.limits_average_torque).worst, key=lambda each: each.ratio)
     when = "" if worst.at_s is None else f" at {worst.at_s:.2f} s"
     parts = f" ({_parts(boom, hasty, worst, base)})" if worst.limit in _INSTANT else ""
     return (

@@ -315,7 +315,7 @@ def test_more_torque_never_improves_a_verdict():
         tau, qd = rng.normal(0.0, 40.0, t.size), rng.normal(0.0, 0.4, t.size)
         worst: dict[str, int] = {}
         for factor in np.geomspace(0.3, 12.0, 12):
-            for r in drive_rows(view(tau=factor * tau, qd=qd, t=t), RATED, None):
+            for r in drive_rows(view(tau=factor * tau, qd=qd, t=t), RATED):
                 if r.verdict in RANKS:
                     rank = RANKS.index(r.verdict)
                     assert rank >= worst.get(r.check, 0), (r.check, factor)

@@ -108,8 +108,8 @@ def test_worst_stop_is_the_longest_and_the_farthest_of_all_moments():
     assert found.distance_m == pytest.approx(farthest[0], rel=1e-3)
     assert found.distance_at_s == pytest.approx(farthest[1], abs=0.1)
     (after,) = timed(BOOM, [JointLine(START, GOAL)], Timing.of("trapezoidal"), None)
-    report = plan(BOOM, START, GOAL, profile="trapezoidal").report
-    assert report.stop == worst_stop(BOOM, (after,))
+    move = plan(BOOM, START, GOAL, profile="trapezoidal")
+    assert move.full_report.stop == move.stop == worst_stop(BOOM, (after,))
 
 
 @pytest.mark.parametrize("at", [-0.1, 1e3, np.nan])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, InfeasibleError, InputError, forward_kinematics
-from planner import Profile, Trajectory, Verdict, average_torque, check, plan
+from planner import Cubic, Profile, Trajectory, Verdict, average_torque, check, plan
 from planner.missions.mission import check_cycle, load_mission, named_missions, plan_cycle
 from planner.motion.trajectory import joined
 from planner.motion.vehicle import load_case
@@ -136,7 +136,7 @@ def test_a_step_takes_the_cubics_velocity_at_its_way_point(mission):
     motion = cycle.legs[0].trajectory
     at = int(np.abs(motion.q - via).max(axis=1).argmin())
     np.testing.assert_allclose(motion.qd[at], rates, rtol=0, atol=3e-4)
-    move = plan(BOOM, "transport", "phenotyping", via=[via], via_velocities=[rates])
+    move = plan(BOOM, "transport", "phenotyping", via=[via], profile=Cubic.with_velocities([rates]))
     assert check_cycle(BOOM, cycle).rows == move.report.rows
 
 

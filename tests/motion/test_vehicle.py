@@ -7,7 +7,7 @@ import pytest
 
 from boom_model import Basis, Boom, InputError, Origin, inverse_dynamics
 from planner import Verdict, check, plan
-from planner.motion.vehicle import VehicleCase, base_motion, base_pose, load_case, named_cases
+from planner.motion.vehicle import LEVEL, VehicleCase, base_motion, base_pose, load_case, named_cases
 
 BOOM = Boom.load()
 MADE_UP = Origin(Basis.ASSUMED, "made up")
@@ -104,14 +104,14 @@ def test_static_rows_take_the_tilt_and_not_the_shock():
     tilted = inverse_dynamics(BOOM, q, np.zeros(5), np.zeros(5), base=base_motion(SLOPE, 0.0)).tau
     assert rows_of(still, "yaw", "drive worst hold").demand == pytest.approx(abs(tilted[0]), rel=1e-12)
     assert abs(tilted[0]) > 10.0  # on level ground the yaw holds nothing
-    calm, shaken = (plan(BOOM, "transport", "phenotyping", vehicle=v).report for v in (None, SHOCK))
+    calm, shaken = (plan(BOOM, "transport", "phenotyping", vehicle=v).report for v in (LEVEL, SHOCK))
     assert rows_of(calm, "inner", "gearbox hold").demand == pytest.approx(
         rows_of(shaken, "inner", "gearbox hold").demand, rel=1e-6
     )
 
 
 def test_shock_is_held_against_the_momentary_peak_torque_alone():
-    level, shaken = (plan(BOOM, "transport", "phenotyping", vehicle=v) for v in (None, SHOCK))
+    level, shaken = (plan(BOOM, "transport", "phenotyping", vehicle=v) for v in (LEVEL, SHOCK))
     assert not any(row.check == "gearbox momentary peak" for row in level.report.rows)
     momentary, repeated = (rows_of(shaken.report, "inner", f"gearbox {name} peak") for name in ("momentary", "repeated"))
     base = base_motion(SHOCK, 1.1)
@@ -149,7 +149,7 @@ def test_a_shock_that_the_motion_does_not_hold_is_not_checkable(shock, resolved)
 
 
 def test_a_shock_between_the_samples_of_a_file_is_not_checkable():
-    coarse = plan(BOOM, "transport", "phenotyping", step=0.1).trajectory
+    coarse = replace(plan(BOOM, "transport", "phenotyping", step=0.1).trajectory, planned=None)
     report = check(BOOM, coarse, vehicle=SHOCK)
     assert rows_of(report, "inner", "gearbox momentary peak").verdict is Verdict.NOT_CHECKABLE
 
@@ -157,7 +157,7 @@ def test_a_shock_between_the_samples_of_a_file_is_not_checkable():
 def test_plan_knows_the_slope():
     """On a slope so steep that the drives decide, the least time is another than on level ground, and still keeps them."""
     heavy = BOOM.with_payload(20.0)
-    level, steep = (plan(heavy, "transport", "phenotyping", profile="time-optimal", vehicle=v) for v in (None, SLOPE))
+    level, steep = (plan(heavy, "transport", "phenotyping", profile="time-optimal", vehicle=v) for v in (LEVEL, SLOPE))
     assert abs(steep.report.duration - level.report.duration) > 1e-3
     row = rows_of(steep.report, "lower", "motor torque")
     assert row.margin >= 0.5 - 1e-3
@@ -172,7 +172,7 @@ def test_vehicle_is_said_in_the_report():
 
 def test_vehicle_at_rest_changes_nothing():
     rest = VehicleCase("rest", MADE_UP)
-    moves = [plan(BOOM, "transport", "phenotyping", vehicle=v) for v in (None, rest)]
+    moves = [plan(BOOM, "transport", "phenotyping", vehicle=v) for v in (LEVEL, rest)]
     np.testing.assert_allclose(moves[1].loads.tau, moves[0].loads.tau, rtol=0, atol=1e-12)
     again = check(BOOM, moves[0].trajectory, vehicle=rest)
     assert again.verdict is Verdict.INCOMPLETE

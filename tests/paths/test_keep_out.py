@@ -8,7 +8,7 @@ import pytest
 from boom_model import Basis, Boom, InfeasibleError, InputError, Origin
 from boom_model.boom_file import BOOM_FILE
 from boom_model.keep_out import Box, Capsule, KeepOut
-from planner import JointLine, TipTarget, plan
+from planner import Cubic, JointLine, TipTarget, plan
 from planner.paths.clearance import LINKS, clearance, least_clearance
 from planner.paths.path import through
 from planner.paths.routing import detour
@@ -188,7 +188,7 @@ def test_other_paths_are_refused_and_not_led_round():
 def test_cubics_through_waypoints_are_held_clear_on_their_own_path_and_not_on_the_spline_that_they_replace():
     start, via, goal = BOOM.pose("transport"), np.array([0.7, 0.5, 2.0, 0.4, -0.2]), BOOM.pose("phenotyping")
     velocities = [[0.0, 0.3, 0.0, -0.25, 0.0]]
-    (motion,) = plan(BOOM, start, goal, via=[via], via_velocities=velocities).motions
+    (motion,) = plan(BOOM, start, goal, via=[via], profile=Cubic.with_velocities(velocities)).motions
     travelled = motion(np.linspace(0.0, motion.duration, 401))[0]
     looked_at = through(BOOM, np.array([start, via, goal]))(np.linspace(0.0, 1.0, 601))
     options = {"gap": 0.01, "link": 0.01, "payload": 0.01}
@@ -202,7 +202,7 @@ def test_cubics_through_waypoints_are_held_clear_on_their_own_path_and_not_on_th
     assert ahead > 0.02  # the spline keeps clear of it
     assert distances(boom, travelled).min() < 0.0  # the cubics run into it
     with pytest.raises(InfeasibleError, match=r"of the path the .* runs into the ball"):
-        plan(boom, start, goal, via=[via], via_velocities=velocities)
+        plan(boom, start, goal, via=[via], profile=Cubic.with_velocities(velocities))
 
 
 @pytest.mark.parametrize("profile", ["cubic", "jerk-limited"])

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, InfeasibleError, InputError
-from planner import JointLine, Profile, TipTarget, plan
+from planner import Cubic, JointLine, Profile, TipTarget, plan
 from planner.paths.path import SplinePath, spaced, through
+from planner.timing.profile import parse_profile
 from planner.timing.timing import Timing, timed
 from tests.limits import ratios, worst
 
@@ -51,7 +52,7 @@ def assert_continuous(motion, orders):
 @pytest.mark.parametrize(("kind", "name"), list(zip(KINDS, NAMES, strict=True)), ids=NAMES)
 def test_every_profile_goes_through_the_waypoints_within_the_limits_and_without_a_stop(kind, name):
     boom = BOOM.with_payload(18.0)
-    move = plan(boom, START, GOAL, profile=kind[0], via=list(VIA), stop_at_via=False, **kind[1])
+    move = plan(boom, START, GOAL, profile=parse_profile(kind[0], **kind[1]), via=list(VIA), stop_at_via=False)
     (motion,) = move.motions
     waypoints = np.array([START, *VIA, GOAL])
     knots = motion.path.spline.x
@@ -104,7 +105,7 @@ def test_cubic_through_waypoints_is_no_slower_than_with_knots_in_proportion_to_t
 @pytest.mark.parametrize("payload", [10.0, 20.0])
 def test_chosen_velocities_are_met_exactly(payload):
     boom = BOOM.with_payload(payload)
-    move = plan(boom, START, GOAL, via=list(VIA), via_velocities=VELOCITIES)
+    move = plan(boom, START, GOAL, via=list(VIA), profile=Cubic.with_velocities(VELOCITIES))
     (motion,) = move.motions
     at = motion.path.spline.x[1:-1] * motion.duration
     for side in (-1e-10, 1e-10):
@@ -124,16 +125,16 @@ def test_chosen_velocities_are_met_exactly(payload):
 
 
 def test_chosen_velocities_hold_in_a_given_duration_and_on_a_controllers_clock():
-    least = plan(BOOM, START, GOAL, via=list(VIA), via_velocities=VELOCITIES).report.duration
-    longer = plan(BOOM, START, GOAL, via=list(VIA), via_velocities=VELOCITIES, duration=least * 1.1)
-    clocked = plan(BOOM, START, GOAL, via=list(VIA), via_velocities=VELOCITIES, rate=10.0)
+    least = plan(BOOM, START, GOAL, via=list(VIA), profile=Cubic.with_velocities(VELOCITIES)).report.duration
+    longer = plan(BOOM, START, GOAL, via=list(VIA), profile=Cubic.with_velocities(VELOCITIES), duration=least * 1.1)
+    clocked = plan(BOOM, START, GOAL, via=list(VIA), profile=Cubic.with_velocities(VELOCITIES), rate=10.0)
     assert longer.report.duration == pytest.approx(least * 1.1, rel=1e-12)
     assert clocked.report.duration == pytest.approx(np.ceil(least * 10.0) / 10.0, rel=1e-12)
     for move in (longer, clocked):
         (motion,) = move.motions
         np.testing.assert_allclose(motion.path(motion.path.spline.x[1:-1], 1) / motion.duration, VELOCITIES, rtol=1e-12)
     with pytest.raises(InfeasibleError, match=r"duration 1 s is too short: with these velocities the cubics need at least"):
-        plan(BOOM, START, GOAL, via=list(VIA), via_velocities=VELOCITIES, duration=1.0)
+        plan(BOOM, START, GOAL, via=list(VIA), profile=Cubic.with_velocities(VELOCITIES), duration=1.0)
 
 
 @pytest.mark.parametrize("profile", Profile)
@@ -170,24 +171,24 @@ def test_velocities_that_run_through_a_limit_are_refused_with_the_joint():
     via = VIA[:1].copy()
     via[0, 4] = LIMITS.upper[4]
     with pytest.raises(InfeasibleError, match=r"with these velocities the cubics leave the limits at \d.*wrist .* above"):
-        plan(BOOM, START, GOAL, via=list(via), via_velocities=[[0.1, 0.1, 0.2, 0.1, 0.5]])
+        plan(BOOM, START, GOAL, via=list(via), profile=Cubic.with_velocities([[0.1, 0.1, 0.2, 0.1, 0.5]]))
 
 
 def test_velocities_beyond_a_joints_limit_are_refused_with_segment_and_joint():
     fast = VELOCITIES.copy()
     fast[1, 3] = 1.5 * LIMITS.velocity[3]
     with pytest.raises(InfeasibleError, match=r"between waypoints 1 and 2 .* joint extension comes nearest with 1\.5 times"):
-        plan(BOOM, START, GOAL, via=list(VIA), via_velocities=fast)
+        plan(BOOM, START, GOAL, via=list(VIA), profile=Cubic.with_velocities(fast))
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"via_velocities": VELOCITIES[:1]}, r"velocities have shape \(1, 5\); with 2 waypoints, .* \(2, 5\)"),
-        ({"via_velocities": VELOCITIES[:, :4]}, r"via_velocities has shape \(2, 4\)"),
-        ({"via_velocities": VELOCITIES * np.nan}, r"via_velocities\[0, 0\] is nan"),
-        ({"via_velocities": VELOCITIES, "profile": "quintic"}, "for the cubic profile, not for quintic"),
-        ({"via_velocities": VELOCITIES, "via": []}, r"with 0 waypoints, .* \(0, 5\)"),
+        ({"velocities": VELOCITIES[:1]}, r"velocities have shape \(1, 5\); with 2 waypoints, .* \(2, 5\)"),
+        ({"velocities": VELOCITIES[:, :4]}, r"via_velocities has shape \(2, 4\)"),
+        ({"velocities": VELOCITIES * np.nan}, r"via_velocities\[0, 0\] is nan"),
+        ({"velocities": VELOCITIES, "profile": "quintic"}, "for the cubic profile, not for quintic"),
+        ({"velocities": VELOCITIES, "via": []}, r"with 0 waypoints, .* \(0, 5\)"),
         ({"stop_at_via": False, "along": "line"}, "led by the joints, not by a line"),
         ({"jerk_bound": True}, "jerk_bound is for the time-optimal profile, not for cubic"),
         ({"average_torque": True, "profile": "jerk-limited"}, "average_torque is for the time-optimal profile"),
@@ -198,7 +199,13 @@ def test_velocities_beyond_a_joints_limit_are_refused_with_segment_and_joint():
 def test_what_does_not_fit_is_named(options, message):
     start, goal = (TipTarget((1.4, 0.0, 1.0)), TipTarget((1.2, 0.3, 1.0))) if "along" in options else (START, GOAL)
     with pytest.raises(InputError, match=message):
-        plan(BOOM, start, goal, **({"via": list(VIA)} | options))
+        planned(start, goal, **({"via": list(VIA)} | options))
+
+
+def planned(start, goal, profile="cubic", jerk_bound=False, average_torque=False, velocities=None, **options):
+    """A move of a profile's word and the options that the command gives beside it."""
+    timing = parse_profile(profile, jerk_bound=jerk_bound, average_torque=average_torque, velocities=velocities)
+    return plan(BOOM, start, goal, profile=timing, **options)
 
 
 def test_one_waypoint_on_the_straight_line_changes_nothing_but_the_timing():

@@ -20,7 +20,7 @@ from boom_model.drives.linear_actuator import LinearActuator, LinearDrive
 from boom_model.keep_out import Box, KeepOut
 from boom_model.kinematics.frames import frame_transforms
 from boom_model.provenance import Basis, Origin
-from planner import cli
+from planner import MoveSpec, cli
 from planner.motion.vehicle import load_case
 from planner.planning import Move, examine, plan
 from planner.profile_table import profile_markdown, profile_moves, profile_rows
@@ -315,7 +315,7 @@ def test_every_view_says_its_unit(panel: Read):
 
 @pytest.fixture(scope="module")
 def moves() -> dict[str, Move]:
-    return profile_moves(BOOM, "transport", "phenotyping", step=0.05)[0]
+    return profile_moves(BOOM, MoveSpec.of("transport", "phenotyping", step=0.05))[0]
 
 
 @pytest.fixture(scope="module")

@@ -341,7 +341,7 @@ def test_payload_is_a_ball_of_steel_at_the_tip(recorded: Recorded, standing: Rec
 
 
 def test_report_is_there_as_markdown(recorded: Recorded):
-    assert recorded.static("/report", "TextDocument:text") == [recorded.move.report.to_markdown()]
+    assert recorded.static("/report", "TextDocument:text") == [recorded.move.full_report.to_markdown()]
     assert recorded.static("/report", "TextDocument:media_type") == ["text/markdown"]
 
 

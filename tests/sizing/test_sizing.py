@@ -8,11 +8,10 @@ import pytest
 
 from boom_model import Boom, Catalogue, Drive, InfeasibleError, InputError, LinearDrive, Wiring
 from planner import Verdict
+from planner.checks.kinds import Severity
 from planner.missions.mission import check_cycle, load_mission, plan_cycle
-from planner.motion.vehicle import load_case
+from planner.motion.vehicle import LEVEL, load_case
 from planner.sizing.choice import (
-    GUIDES,
-    POWER_OFF,
     Adapt,
     Choice,
     candidates,
@@ -22,7 +21,6 @@ from planner.sizing.choice import (
     room,
     size,
     too_high,
-    with_drive,
 )
 from planner.sizing.tables import motors, outcome, ranking, saving, sizing_json, sizing_markdown, sizing_notes
 from tests.checks.test_actuator_checks import SCREW
@@ -61,9 +59,11 @@ def test_without_a_voltage_anywhere_there_is_none_to_try():
 def test_every_row_is_the_checks_own():
     """A drive put on the boom and checked with the whole mission gives the rows that it was judged by."""
     for judged in sized(joint="lower"):
-        report = check_cycle(with_drive(BOOM, "lower", judged.drive), CYCLE)
+        report = check_cycle(BOOM.with_drive("lower", judged.drive), CYCLE)
         rows = tuple(
-            r for r in report.rows if r.joint == "lower" and r.check.startswith(("gearbox", "motor")) and r.check != POWER_OFF
+            r
+            for r in report.rows
+            if r.joint == "lower" and r.check.startswith(("gearbox", "motor")) and r.check != "power-off hold"
         )
         assert judged.rows == rows
 
@@ -93,7 +93,7 @@ def test_what_does_not_pass_says_why_and_nothing_passes_without_rows():
         assert judged.fails is (judged.first_failing is not None)
         if not judged.fails:
             assert outcome(judged) == "INCOMPLETE: 3 without data"
-        assert judged.tightest() is None or judged.tightest().check not in GUIDES
+        assert judged.tightest() is None or judged.tightest().kind.severity is Severity.LIMIT
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_rescaling_finds_the_least_factor_with_which_nothing_fails():
     assert 1.0 < factor < 3.0
     for share, passes in ((1.0, True), (0.985, False)):
         slower = CYCLE.stretched(share * factor)
-        assert fitted(with_drive(BOOM, "lower", slowed[name].drive), slower, "lower").fails is not passes
+        assert fitted(BOOM.with_drive("lower", slowed[name].drive), slower, "lower").fails is not passes
     assert slowed[name].duration == pytest.approx(CYCLE.duty.duration + slowed[name].moving - plain[name].moving, rel=1e-9)
 
 
@@ -218,8 +218,8 @@ def test_replanning_sizes_for_a_mission_that_the_fitted_drive_cannot_do(undersiz
     assert not choice.unmet
     assert [j.name for j in choice.judged if not j.fails] == ["BIG + HUGE"]
     assert choice.lightest.rows == fitted(
-        with_drive(boom, "lower", choice.lightest.drive),
-        plan_cycle(with_drive(boom, "lower", choice.lightest.drive), mission),
+        boom.with_drive("lower", choice.lightest.drive),
+        plan_cycle(boom.with_drive("lower", choice.lightest.drive), mission),
         "lower",
     ).rows  # fmt: skip
     notes = sizing_notes((choice,), Adapt.REPLAN)
@@ -245,7 +245,7 @@ def test_replanning_plans_on_the_slope_and_with_the_variant(undersized):
     mission, slope, boom = undersized[0], load_case("slope"), BOOM.with_payload(22.0)
     drive = boom.drives[2]
     (level,), (tilted,) = (
-        size(boom, mission, "lower", [drive], adapt=Adapt.REPLAN, vehicle=vehicle) for vehicle in (None, slope)
+        size(boom, mission, "lower", [drive], adapt=Adapt.REPLAN, vehicle=vehicle) for vehicle in (LEVEL, slope)
     )
     assert tilted.moving == pytest.approx(plan_cycle(boom, mission, slope).duty.duration, rel=1e-12)
     assert tilted.moving > 1.0005 * level.moving
@@ -279,9 +279,11 @@ def test_on_a_slope_the_rows_are_those_of_the_mission_on_the_slope(adapt):
     drives = candidates(BOOM, "inner", CATALOGUE)[:2]
     level = {j.supply: j.rows for j in size(BOOM, cycle, "inner", drives)}
     for judged in size(BOOM, cycle, "inner", drives, adapt=adapt, vehicle=slope):
-        report = check_cycle(with_drive(BOOM, "inner", judged.drive), cycle, vehicle=slope)
+        report = check_cycle(BOOM.with_drive("inner", judged.drive), cycle, vehicle=slope)
         expected = tuple(
-            r for r in report.rows if r.joint == "inner" and r.check.startswith(("gearbox", "motor")) and r.check != POWER_OFF
+            r
+            for r in report.rows
+            if r.joint == "inner" and r.check.startswith(("gearbox", "motor")) and r.check != "power-off hold"
         )
         assert judged.rows == expected
         assert judged.rows != level[judged.supply]
@@ -326,9 +328,9 @@ def test_the_extension_takes_actuators_alone():
     assert found == (LinearDrive(SCREW),)
     (judged,) = size(BOOM, MAIN, "extension", found)
     assert (judged.name, judged.mass, judged.supply) == ("SCREW", 4.0, "-")
-    assert not any(row.check == POWER_OFF for row in judged.rows)
+    assert not any(row.check == "power-off hold" for row in judged.rows)
     assert judged.first_failing.check == "actuator duty"  # a lone move, without a pause
-    assert with_drive(BOOM, "extension", found[0]).actuator is found[0]
+    assert BOOM.with_drive("extension", found[0]).actuator is found[0]
 
 
 def test_tables_say_what_was_chosen():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, inverse_dynamics
-from planner import InfeasiblePathError, JointLine, plan
+from planner import InfeasiblePathError, JointLine, TimeOptimal, plan
 from planner.timing.timing import Timing, timed
 from tests.limits import times, worst
 
@@ -82,7 +82,7 @@ def test_a_load_whose_holding_alone_averages_too_much_is_refused_with_joint_and_
     with pytest.raises(
         InfeasiblePathError, match=r"at (inner|lower) the load that is held alone averages \d+\.\d Nm"
     ) as caught:
-        plan(limited(limit), START, GOAL, profile="time-optimal", average_torque=True)
+        plan(limited(limit), START, GOAL, profile=TimeOptimal(average_torque=True))
     assert caught.value.joint == ("inner", "lower")[int(np.argmax(SLOW))]
     assert caught.value.demand == pytest.approx(SLOW.max(), rel=1e-3)
     assert caught.value.limit == limit

@@ -7,7 +7,7 @@ import pytest
 
 from boom_model import Boom, InfeasibleError, inverse_dynamics
 from boom_model.drives.drive import reflected_inertia
-from planner import InfeasiblePathError, JointLine, Profile, plan, sample
+from planner import Cubic, InfeasiblePathError, JointLine, Profile, TimeOptimal, plan, sample
 from planner.timing.path_limits import motor_limits
 from planner.timing.timing import Timing, timed
 
@@ -233,9 +233,9 @@ def test_given_duration_is_met_and_a_shorter_one_than_the_least_refused(profile)
     [
         *({"profile": profile} for profile in Profile),
         *({"profile": profile, "via": [VIA], "stop_at_via": False} for profile in Profile),
-        {"profile": "cubic", "via": [VIA], "via_velocities": [[0.1, 0.1, 0.2, 0.1, 0.1]]},
-        {"profile": "time-optimal", "jerk_bound": True, "rate": 100.0},
-        {"profile": "time-optimal", "average_torque": True, "duration": 9.0},
+        {"profile": Cubic.with_velocities([[0.1, 0.1, 0.2, 0.1, 0.1]]), "via": [VIA]},
+        {"profile": TimeOptimal(jerk_bound=True), "rate": 100.0},
+        {"profile": TimeOptimal(average_torque=True), "duration": 9.0},
     ],
     ids=str,
 )
@@ -248,4 +248,4 @@ def test_no_profile_reaches_for_the_network(options, monkeypatch):
     for name in ("socket", "create_connection", "getaddrinfo"):
         monkeypatch.setattr(socket, name, refuse)
     move = plan(BOOM, "transport", "phenotyping", **options)
-    assert move.report.stop is not None  # stopping asks ruckig as well
+    assert move.stop is not None  # stopping asks ruckig as well

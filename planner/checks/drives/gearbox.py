@@ -9,7 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from boom_model import Basis, Drive, Gearbox, Origin, wind_up
+from planner.checks.drives.brake import power_off_row
 from planner.checks.drives.joint_view import JointView, Shock
+from planner.checks.kinds import CheckKind
 from planner.checks.rows import Row, Verdict
 
 FAMILY_LIFE = 35_000.0 * 3600.0
@@ -46,43 +48,44 @@ def _torque_rows(view: JointView, gear: Gearbox, shock: Shock | None, procedure:
         peak, at = view.peak(view.tau)
         unseen = Origin(Basis.PRINTED, "the shock is not inside the motion, or has too few samples to see its peak")
         limit, origin = (gear.peak_torque, procedure) if shock.resolved else (None, unseen)
-        yield view.held("gearbox momentary peak", peak, limit, "Nm", at, origin)
+        yield view.compared(CheckKind.GEARBOX_MOMENTARY_PEAK, demand=peak, limit=limit, at=at, origin=origin)
         yield _events_row(view, gear, shock)
     peak, at = view.peak(view.calm)
-    yield view.held("gearbox repeated peak", peak, gear.start_stop_torque, "Nm", at, procedure)
+    yield view.compared(CheckKind.GEARBOX_REPEATED_PEAK, demand=peak, limit=gear.start_stop_torque, at=at, origin=procedure)
     average = view.duty.travel_mean(view.calm, view.qd)
     if average is not None:
-        yield view.held("gearbox average", average, gear.max_average_torque, "Nm", None, procedure)
+        yield view.compared(CheckKind.GEARBOX_AVERAGE, demand=average, limit=gear.max_average_torque, origin=procedure)
         rated = Origin(Basis.PRINTED, f"{gear.source}; rated torque, which enters the life and is no limit of its own")
-        yield view.told("gearbox continuous", average, "Nm", None, rated, gear.continuous_torque)
+        yield view.informative(CheckKind.GEARBOX_CONTINUOUS, figure=average, limit=gear.continuous_torque, origin=rated)
     hold, at = view.peak(view.static)
     derived = Origin(
         Basis.PRINTED, f"{gear.source}; held for ever at the worst pose, against the average rating [own derivation]"
     )
-    yield view.held("gearbox hold", hold, gear.max_average_torque, "Nm", at, derived)
+    yield view.compared(CheckKind.GEARBOX_HOLD, demand=hold, limit=gear.max_average_torque, at=at, origin=derived)
 
 
 def _events_row(view: JointView, gear: Gearbox, shock: Shock) -> Row:
     """How often the shock may come: 1e4 / (2 (n / 60) N t), with the joint's fastest speed n while it lasts."""
-    check, speed = "gearbox momentary peaks", float(np.abs(view.qd[shock.inside]).max(initial=0.0))
+    kind, speed = CheckKind.GEARBOX_MOMENTARY_PEAKS, float(np.abs(view.qd[shock.inside]).max(initial=0.0))
     turns = gear.ratio * speed / (2.0 * np.pi) * shock.duration
     allowed = MOMENTARY_CYCLES / max(2.0 * turns, 1.0)  # a shock at rest still loads the teeth once
     origin = Origin(Basis.PRINTED, f"1e4 / (2 (n / 60) N t), at {turns:.2g} turns of the input in a shock; {_PROCEDURE}")
     if shock.events is None or not shock.resolved:
         why = f"how many shocks it is to survive is not given (it bears {allowed:.0f}); {origin.source}"
-        return Row(view.joint, check, shock.events, None, "times", None, 0.0, None, Verdict.NOT_CHECKABLE, None, why)
-    return view.held(check, shock.events, allowed, "times", None, origin)
+        return view.unknown(kind, why=why, demand=shock.events)
+    return view.compared(kind, demand=shock.events, limit=allowed, origin=origin)
 
 
 def _speed_rows(view: JointView, gear: Gearbox) -> Iterator[Row]:
     fastest, at = view.peak(view.qd)
     average = view.duty.mean(np.abs(view.qd))
-    for check, speed, limit, when in (
-        ("gearbox input speed", fastest, gear.max_input_speed, at),
-        ("gearbox average input speed", average, gear.max_average_input_speed, None),
+    for kind, speed, limit, when in (
+        (CheckKind.GEARBOX_INPUT_SPEED, fastest, gear.max_input_speed, at),
+        (CheckKind.GEARBOX_AVERAGE_INPUT_SPEED, average, gear.max_average_input_speed, None),
     ):
         missing = "" if limit else "; no such speed is printed"
-        yield view.held(check, gear.ratio * speed, limit, "rad/s", when, Origin(Basis.PRINTED, gear.source + missing))
+        sheet = Origin(Basis.PRINTED, gear.source + missing)
+        yield view.compared(kind, demand=gear.ratio * speed, limit=limit, at=when, origin=sheet)
 
 
 def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
@@ -91,7 +94,7 @@ def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
     speed = gear.ratio * view.duty.mean(np.abs(view.qd))
     if average is None or average == 0.0:
         return
-    wanted, check = view.duty.required_life, "gearbox life"
+    wanted, kind = view.duty.required_life, CheckKind.GEARBOX_LIFE
     asked = None if wanted is None else wanted.value
     printed = gear.rated_life is not None and gear.rated_input_speed is not None
     life, rated_speed = (gear.rated_life, gear.rated_input_speed) if printed else (FAMILY_LIFE, FAMILY_INPUT_SPEED)
@@ -103,39 +106,52 @@ def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
             "" if L10 is None else f"; indicative L10 {L10 / 3600.0:,.0f} h, with 35,000 h at 2000 rpm of others of its kind"
         )
         why = f"{gear.source}; no rated life and speed are printed{figure}"
-        yield Row(view.joint, check, asked, L10, "s", None, 0.0, None, Verdict.NOT_CHECKABLE, None, why)
+        yield view.unknown(kind, why=why, demand=asked, limit=L10)
         return
     origin = Origin(Basis.PRINTED, f"{gear.source}; L10 = L50 / 5; {_PROCEDURE}")
     if wanted is None:
-        yield Row(view.joint, check, None, L10, "s", None, 0.0, None, Verdict.INFO, origin.basis, origin.source)
+        yield Row(
+            joint=view.joint,
+            kind=kind,
+            demand=None,
+            limit=L10,
+            margin=None,
+            at_s=None,
+            verdict=Verdict.INFO,
+            basis=origin.basis,
+            source=origin.source,
+        )
         return
     basis = Basis.weakest([origin.basis, wanted.origin.basis])
-    yield view.held(check, wanted.value, L10, "s", None, Origin(basis, f"{origin.source}; asked: {wanted.origin.source}"))
+    both = Origin(basis, f"{origin.source}; asked: {wanted.origin.source}")
+    yield view.compared(kind, demand=wanted.value, limit=L10, origin=both)
 
 
 def _compliance_rows(view: JointView, gear: Gearbox) -> Iterator[Row]:
     sheet = Origin(Basis.PRINTED, gear.source)
     load, at = view.peak(view.tau)
     angle = wind_up(gear, load)
-    yield view.told("gearbox wind-up", None if angle is None else float(angle), "rad", at, sheet)
-    yield view.told("gearbox backlash", gear.backlash, "rad", None, sheet)
-    yield view.told("gearbox hysteresis", gear.hysteresis, "rad", None, sheet)
+    yield view.informative(CheckKind.GEARBOX_WIND_UP, figure=None if angle is None else float(angle), at=at, origin=sheet)
+    yield view.informative(CheckKind.GEARBOX_BACKLASH, figure=gear.backlash, origin=sheet)
+    yield view.informative(CheckKind.GEARBOX_HYSTERESIS, figure=gear.hysteresis, origin=sheet)
     inertia = float(view.inertia.max())
     guide = Origin(Basis.PRINTED, f"sqrt(K1 / J) / (2 pi) at J = {inertia:.4g} kg m^2, against a guide; {gear.source}")
     first = None
     if gear.torsion_stiffness is not None and inertia > 0.0:
         first = float(np.sqrt(gear.torsion_stiffness[0] / inertia) / (2.0 * np.pi))
-    yield view.guided("gearbox resonance", LEAST_FREQUENCY, first, "Hz", None, guide)
+    yield view.compared(CheckKind.GEARBOX_RESONANCE, demand=LEAST_FREQUENCY, limit=first, origin=guide)
 
 
 def _power_off_row(view: JointView, drive: Drive) -> Row:
     """Backdriving starts somewhere about the printed torque, which is no holding margin: only a brake holds."""
     demand, at = view.peak(view.static)
-    facts = (view.joint, "power-off hold", demand, drive.gearbox.backdrive_torque, "Nm", None, 0.0, at)
-    brake, sheet = drive.brake, drive.gearbox.source
-    if brake is not None and brake.value:
-        verdict = Verdict.WARN if brake.origin.basis is not Basis.PRINTED else Verdict.PASS
-        return Row(
-            *facts, verdict, brake.origin.basis, f"held by a brake: {brake.origin.source}; backdriven otherwise, {sheet}"
-        )
-    return Row(*facts, Verdict.FAIL, Basis.PRINTED, f"no brake is declared, and the gearbox is backdriven: {sheet}")
+    why = drive.gearbox.source
+    return power_off_row(
+        view,
+        demand=demand,
+        limit=drive.gearbox.backdrive_torque,
+        at=at,
+        brake=drive.brake,
+        held=f"backdriven otherwise, {why}",
+        unheld=f"no brake is declared, and the gearbox is backdriven: {why}",
+    )

@@ -7,7 +7,8 @@ import numpy as np
 from boom_model import Basis, Origin
 from boom_model.arrays import Array, Mask
 from planner.checks.drives.duty import Duty
-from planner.checks.rows import Row, guided, held, told
+from planner.checks.kinds import CheckKind
+from planner.checks.rows import Row, compared, informative, unknown
 from planner.motion.trajectory import Trajectory
 
 
@@ -69,27 +70,29 @@ class JointView:
         at = int(np.argmax(np.abs(values)))
         return float(abs(values[at])), float(self.t[at])
 
-    def held(
+    def compared(
         self,
-        check: str,
+        kind: CheckKind,
+        *,
         demand: float,
         limit: float | None,
-        unit: str,
-        at: float | None,
         origin: Origin,
-        required: float = 0.0,
+        at: float | None = None,
         warn_near: bool = False,
     ) -> Row:
-        """`rows.held` for a torque: no better founded than the torque itself."""
-        return held(self.joint, check, demand, limit, unit, at, self._founded(origin), required, warn_near)
+        """`rows.compared` of the joint; its basis is no better than the torque's."""
+        founded = self._founded(origin)
+        return compared(joint=self.joint, kind=kind, demand=demand, limit=limit, origin=founded, at=at, warn_near=warn_near)
 
-    def guided(self, check: str, demand: float, limit: float | None, unit: str, at: float | None, origin: Origin) -> Row:
-        return guided(self.joint, check, demand, limit, unit, at, self._founded(origin))
-
-    def told(
-        self, check: str, figure: float | None, unit: str, at: float | None, origin: Origin, limit: float | None = None
+    def informative(
+        self, kind: CheckKind, *, figure: float | None, origin: Origin, at: float | None = None, limit: float | None = None
     ) -> Row:
-        return told(self.joint, check, figure, unit, at, self._founded(origin), limit)
+        """`rows.informative` of the joint, likewise."""
+        return informative(joint=self.joint, kind=kind, figure=figure, origin=self._founded(origin), at=at, limit=limit)
+
+    def unknown(self, kind: CheckKind, *, why: str, demand: float | None = None, limit: float | None = None) -> Row:
+        """`rows.unknown` of the joint."""
+        return unknown(joint=self.joint, kind=kind, why=why, demand=demand, limit=limit)
 
     def _founded(self, origin: Origin) -> Origin:
         return replace(origin, basis=Basis.weakest([origin.basis, self.basis]))

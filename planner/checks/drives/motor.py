@@ -8,6 +8,7 @@ from boom_model import Basis, Drive, Motor, Origin, mesh_efficiency
 from boom_model.arrays import Array
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque, speed_for_torque
 from planner.checks.drives.joint_view import JointView
+from planner.checks.kinds import CheckKind
 from planner.checks.rows import SAMPLING_SLACK, Row, Verdict
 
 LOW_SPEED = 2.0 * np.pi
@@ -28,7 +29,7 @@ def motor_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     motor, gear = drive.motor, drive.gearbox
     hold, at = view.peak(view.static)
     origin = Origin(Basis.PRINTED, f"{_sheet(motor)}; no credit for friction [own derivation]")
-    yield view.held("motor hold", hold / gear.ratio, motor.holding_torque, "Nm", at, origin, STEPPER_MARGIN)
+    yield view.compared(CheckKind.MOTOR_HOLD, demand=hold / gear.ratio, limit=motor.holding_torque, at=at, origin=origin)
     yield from _torque_rows(view, drive)
     yield _inertia_row(view, drive)
     yield _resonance_row(view, drive)
@@ -36,19 +37,19 @@ def motor_rows(view: JointView, drive: Drive) -> Iterator[Row]:
 
 
 def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
-    directions = [("motor torque", view.tau, view.qd)]
+    directions = [(CheckKind.MOTOR_TORQUE, view.tau, view.qd)]
     if view.steady:  # backwards, friction turns round and the rest stays
-        directions.append(("motor torque, reversed", view.tau - 2.0 * view.friction, -view.qd))
+        directions.append((CheckKind.MOTOR_TORQUE_REVERSED, view.tau - 2.0 * view.friction, -view.qd))
     demands, other = [], []
-    for check, tau, qd in directions:
+    for kind, tau, qd in directions:
         torque = motor_torque(drive, tau, qd, view.qdd)
         if torque is None:
-            yield from _unknown_torque_rows(view, drive, [check for check, *_ in directions])
+            yield from _unknown_torque_rows(view, drive, [kind for kind, *_ in directions])
             return
         demands.append(np.abs(torque))
         less = motor_torque(drive, tau, qd, view.qdd, no_load_in_efficiency=True)
         other += [] if less is None else [np.abs(less)]
-        yield _motor_torque_row(view, drive, check, demands[-1])
+        yield _motor_torque_row(view, drive, kind, demands[-1])
     yield _quasi_static_row(view, drive)
     if other:
         yield _other_reading_row(view, drive, np.max(other, axis=0))
@@ -56,31 +57,26 @@ def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     braked = drive.brake is not None and drive.brake.value  # without one the motor holds in a pause too
     driven = np.where(view.duty.powered, demands[0], 0.0) if braked else demands[0]
     known = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; a stepper's heat goes with its current, not with its torque")
-    yield view.told("motor RMS torque", view.duty.mean(driven**2) ** 0.5, "Nm", None, known)
+    yield view.informative(CheckKind.MOTOR_RMS_TORQUE, figure=view.duty.mean(driven**2) ** 0.5, origin=known)
 
 
-def _unknown_torque_rows(view: JointView, drive: Drive, directions: list[str]) -> Iterator[Row]:
+def _unknown_torque_rows(view: JointView, drive: Drive, directions: list[CheckKind]) -> Iterator[Row]:
     """What cannot be said of a motor whose torque is not known; how fast it turns is."""
-    for check in directions:
-        yield _unknown_torque_row(view, drive, check)
+    for kind in directions:
+        yield view.unknown(kind, why=_unknown_torque(drive))
     yield _quasi_static_row(view, drive)
     unknown = Origin(Basis.PRINTED, _unknown_torque(drive))
-    yield view.told("motor torque, other reading", None, "Nm", None, unknown)
+    yield view.informative(CheckKind.MOTOR_TORQUE_OTHER_READING, figure=None, origin=unknown)
     fastest, at = view.peak(view.qd)
-    yield view.held("motor speed", drive.gearbox.ratio * fastest, None, "rad/s", at, unknown)
-    yield view.told("motor RMS torque", None, "Nm", None, unknown)
-
-
-def _unknown_torque_row(view: JointView, drive: Drive, check: str) -> Row:
-    why = _unknown_torque(drive)
-    return Row(view.joint, check, None, None, "Nm", None, STEPPER_MARGIN, None, Verdict.NOT_CHECKABLE, None, why)
+    yield view.compared(CheckKind.MOTOR_SPEED, demand=drive.gearbox.ratio * fastest, limit=None, at=at, origin=unknown)
+    yield view.informative(CheckKind.MOTOR_RMS_TORQUE, figure=None, origin=unknown)
 
 
 def _unknown_torque(drive: Drive) -> str:
     return f"{_sheet(drive.motor)}; {drive.gearbox.source}; efficiency, no-load torque or an inertia is not printed"
 
 
-def _motor_torque_row(view: JointView, drive: Drive, check: str, torque: Array) -> Row:
+def _motor_torque_row(view: JointView, drive: Drive, kind: CheckKind, torque: Array) -> Row:
     """The sample with the least margin against the torque-speed curve, or against the running torque where turning slowly."""
     motor = drive.motor
     speed = drive.gearbox.ratio * np.abs(view.qd)
@@ -91,17 +87,17 @@ def _motor_torque_row(view: JointView, drive: Drive, check: str, torque: Array) 
         most, at = view.peak(torque)
         if running is not None and most * (1.0 + STEPPER_MARGIN - SAMPLING_SLACK) > running:
             # no supply makes a motor stronger than its running torque
-            return view.held(check, most, running, "Nm", at, slow, STEPPER_MARGIN)
+            return view.compared(kind, demand=most, limit=running, at=at, origin=slow)
         unknown = Origin(Basis.PRINTED, f"{_sheet(motor)}; above low speed only with bus voltage and wiring")
-        return view.held(check, most, None, "Nm", at, unknown, STEPPER_MARGIN)
+        return view.compared(kind, demand=most, limit=None, at=at, origin=unknown)
     available = np.full_like(torque, running) if curve is None else curve
     on_curve = available < running * (1.0 - SAMPLING_SLACK)
     rows = []
     for part, origin, estimated in ((~on_curve, slow, False), (on_curve, _curve_origin(drive, "torque-speed curve"), True)):
         if part.any():
             at = int(np.flatnonzero(part)[_least_room(available[part], torque[part])])
-            facts = (float(torque[at]), float(available[at]), "Nm", float(view.t[at]))
-            rows.append(view.held(check, *facts, origin, STEPPER_MARGIN, warn_near=estimated))
+            demand, limit, when = float(torque[at]), float(available[at]), float(view.t[at])
+            rows.append(view.compared(kind, demand=demand, limit=limit, at=when, origin=origin, warn_near=estimated))
     return max(rows, key=_severity)
 
 
@@ -113,15 +109,15 @@ def _severity(row: Row) -> tuple[int, float]:
 def _quasi_static_row(view: JointView, drive: Drive) -> Row:
     """The limit of moving ever more slowly, either way, through the poses: lifting the worst of them at no speed."""
     load, at = view.peak(np.abs(view.static) + view.coulomb)
-    torque, check = motor_torque(drive, load, 1.0, 0.0), "motor torque, quasi-static"
+    torque, kind = motor_torque(drive, load, 1.0, 0.0), CheckKind.MOTOR_TORQUE_QUASI_STATIC
     if torque is None:
-        return _unknown_torque_row(view, drive, check)
+        return view.unknown(kind, why=_unknown_torque(drive))
     running, curve = drive.motor.running_torque, available_torque(drive, 0.0)
     limit = running if curve is None else float(curve)
     weak = running is not None and limit is not None and limit < running * (1.0 - SAMPLING_SLACK)
     slow = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}, running torque; the slowest motion through the poses")
     origin = _curve_origin(drive, "torque at no speed") if weak else slow
-    return view.held(check, float(torque), limit, "Nm", at, origin, STEPPER_MARGIN, weak)
+    return view.compared(kind, demand=float(torque), limit=limit, at=at, origin=origin, warn_near=weak)
 
 
 def _other_reading_row(view: JointView, drive: Drive, torque: Array) -> Row:
@@ -135,8 +131,8 @@ def _other_reading_row(view: JointView, drive: Drive, torque: Array) -> Row:
         f"{_sheet(drive.motor)}",
     )
     limit = None if available is None else float(available[at])
-    facts = (float(torque[at]), "Nm", float(view.t[at]), origin, limit)
-    return view.told("motor torque, other reading", *facts)
+    figure, when = float(torque[at]), float(view.t[at])
+    return view.informative(CheckKind.MOTOR_TORQUE_OTHER_READING, figure=figure, at=when, origin=origin, limit=limit)
 
 
 def _motor_speed_row(view: JointView, drive: Drive, torque: Array) -> Row:
@@ -150,7 +146,8 @@ def _motor_speed_row(view: JointView, drive: Drive, torque: Array) -> Row:
     else:
         at = _least_room(highest, speed)
         limit = float(highest[at]) if np.isfinite(highest[at]) else None
-    return view.held("motor speed", float(speed[at]), limit, "rad/s", float(view.t[at]), origin, warn_near=True)
+    demand, when = float(speed[at]), float(view.t[at])
+    return view.compared(CheckKind.MOTOR_SPEED, demand=demand, limit=limit, at=when, origin=origin, warn_near=True)
 
 
 def _inertia_row(view: JointView, drive: Drive) -> Row:
@@ -158,7 +155,7 @@ def _inertia_row(view: JointView, drive: Drive) -> Row:
     ratio = 0.0 if rotor is None else load / drive.gearbox.ratio**2 / rotor
     guide = f"load {load:.4g} kg m^2 over N^2, against the rotor's alone; a guide; {_sheet(drive.motor)}"
     limit = None if rotor is None else INERTIA_RATIO
-    return view.guided("motor inertia ratio", ratio, limit, "", None, Origin(Basis.PRINTED, guide))
+    return view.compared(CheckKind.MOTOR_INERTIA_RATIO, demand=ratio, limit=limit, origin=Origin(Basis.PRINTED, guide))
 
 
 def full_step_resonance(drive: Drive) -> float | None:
@@ -175,10 +172,10 @@ def full_step_resonance(drive: Drive) -> float | None:
 
 
 def _resonance_row(view: JointView, drive: Drive) -> Row:
-    frequency, check = full_step_resonance(drive), "motor resonance dwell"
+    frequency, kind = full_step_resonance(drive), CheckKind.MOTOR_RESONANCE_DWELL
     if frequency is None:
         why = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; holding torque or an inertia is not printed")
-        return view.guided(check, 0.0, None, "s", None, why)
+        return view.compared(kind, demand=0.0, limit=None, origin=why)
     speed, resonant = drive.gearbox.ratio * np.abs(view.qd), frequency * drive.motor.step
     longest, at = longest_dwell(view.t, speed, resonant * (1.0 - RESONANCE_BAND), resonant * (1.0 + RESONANCE_BAND))
     origin = Origin(
@@ -186,7 +183,7 @@ def _resonance_row(view: JointView, drive: Drive) -> Row:
         f"full-step resonance {frequency:.0f} Hz, {resonant * 30.0 / np.pi:.1f} rpm +-{RESONANCE_BAND:.0%}, for "
         f"{RESONANCE_CYCLES:g} periods; microsteps excite it less [own derivation]; {_sheet(drive.motor)}",
     )
-    return view.guided(check, longest, RESONANCE_CYCLES / frequency, "s", at, origin)
+    return view.compared(kind, demand=longest, limit=RESONANCE_CYCLES / frequency, at=at, origin=origin)
 
 
 def longest_dwell(t: Array, speed: Array, low: float, high: float) -> tuple[float, float | None]:
@@ -210,10 +207,10 @@ def longest_dwell(t: Array, speed: Array, low: float, high: float) -> tuple[floa
 
 def _overload_row(view: JointView, drive: Drive) -> Row:
     """Whether the motor, at its running torque, passes what its gearbox may bear: then its current wants a limit."""
-    motor, gear, check = drive.motor, drive.gearbox, "motor against gearbox"
+    motor, gear, kind = drive.motor, drive.gearbox, CheckKind.MOTOR_AGAINST_GEARBOX
     if motor.running_torque is None or gear.efficiency is None or gear.start_stop_torque is None:
         why = f"{_sheet(motor)}; {gear.source}; running torque, efficiency or start-stop torque is not printed"
-        return Row(view.joint, check, None, None, "Nm", None, 0.0, None, Verdict.NOT_CHECKABLE, None, why)
+        return view.unknown(kind, why=why)
     at_joint = motor.running_torque * gear.ratio * gear.efficiency
     enough = gear.start_stop_torque / (gear.ratio * gear.efficiency)
     mesh = mesh_efficiency(gear)
@@ -226,7 +223,7 @@ def _overload_row(view: JointView, drive: Drive) -> Row:
             f"the motor can pass the start-stop torque: hold its current to {enough / motor.running_torque:.0%}{amperes}, "
             f"{enough:.2f} Nm at the motor, if either reading of the efficiency may hold; {said}"
         )
-    return view.guided(check, at_joint, gear.start_stop_torque, "Nm", None, Origin(Basis.PRINTED, said))
+    return view.compared(kind, demand=at_joint, limit=gear.start_stop_torque, origin=Origin(Basis.PRINTED, said))
 
 
 def _least_room(limit: Array, demand: Array) -> int:

@@ -1,0 +1,207 @@
+"""The profiles: how each one times a path, with the options that it alone has.
+
+To add a profile, write its law in a file of `profiles/`, give it a class here, and add that to PROFILES.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from types import MappingProxyType
+from typing import ClassVar
+
+from numpy.typing import ArrayLike
+
+from boom_model import BaseMotion, Boom, InputError
+from boom_model.arrays import Array, checked, read_only
+from planner.paths.clearance import require_path_clear
+from planner.paths.path import Path, SplinePath
+from planner.timing.time_law import Motion, TimeLaw
+
+
+class Profile(StrEnum):
+    """The word for each profile."""
+
+    CUBIC = "cubic"
+    QUINTIC = "quintic"
+    TRAPEZOIDAL = "trapezoidal"
+    JERK_LIMITED = "jerk-limited"
+    TIME_OPTIMAL = "time-optimal"
+
+
+@dataclass(frozen=True)
+class TimingProfile(ABC):
+    """How a path is timed. Each law's library is imported where it is used: they are slow to import."""
+
+    name: ClassVar[Profile]
+
+    @abstractmethod
+    def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        """The time law along a path on a base that is tilted at most.
+
+        Raises:
+            InfeasibleError: no law keeps the limits.
+        """
+
+    def motion(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> Motion:
+        """The motion along a path, in the least time of this profile.
+
+        Raises:
+            InfeasibleError: as `law`.
+        """
+        return Motion(path, self.law(boom, path, base))
+
+    @property
+    def limits_jerk(self) -> bool:
+        """Whether the joints' jerk limits are kept."""
+        return False
+
+    @property
+    def limits_average_torque(self) -> bool:
+        """Whether the gearboxes' average torque is kept."""
+        return False
+
+    @property
+    def exact_on_lines(self) -> bool:
+        """Whether the law keeps every limit along a straight joint path, between the points that it looked at as well."""
+        return True
+
+    def __str__(self) -> str:
+        return str(self.name)
+
+
+@dataclass(frozen=True, eq=False)
+class Cubic(TimingProfile):
+    """Cubic polynomial in time from rest to rest; a cubic spline through waypoints that are passed without a stop."""
+
+    name = Profile.CUBIC
+    velocities: Array | None = None
+    """(k, 5) joint velocities at the k waypoints [rad/s, the extension's m/s]; None makes the acceleration continuous."""
+
+    @staticmethod
+    def with_velocities(velocities: ArrayLike) -> "Cubic":
+        """The cubic with given velocities at its waypoints.
+
+        Raises:
+            InputError: not finite, or not (k, 5).
+        """
+        return Cubic(read_only(checked("via_velocities", velocities, 5)))
+
+    def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        from planner.timing.profiles.cubic import cubic
+
+        return cubic(boom, path, base)
+
+    def motion(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> Motion:
+        if not isinstance(path, SplinePath):
+            return super().motion(boom, path, base)
+        from planner.timing.profiles.cubic_through import cubic_through
+
+        motion = cubic_through(boom, path.waypoints, base)
+        require_path_clear(boom, motion.path)  # another path than the one that was looked at
+        return motion
+
+
+@dataclass(frozen=True)
+class Quintic(TimingProfile):
+    """Quintic polynomial in time: zero acceleration at both ends."""
+
+    name = Profile.QUINTIC
+
+    def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        from planner.timing.profiles.quintic import quintic
+
+        return quintic(boom, path, base)
+
+
+@dataclass(frozen=True)
+class Trapezoidal(TimingProfile):
+    """Constant acceleration, constant speed, constant deceleration."""
+
+    name = Profile.TRAPEZOIDAL
+
+    def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        from planner.timing.profiles.trapezoidal import trapezoidal
+
+        return trapezoidal(boom, path, base)
+
+
+@dataclass(frozen=True)
+class JerkLimited(TimingProfile):
+    """Shortest motion within even limits on speed, acceleration and jerk along the path."""
+
+    name = Profile.JERK_LIMITED
+
+    def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        from planner.timing.profiles.jerk_limited import jerk_limited
+
+        return jerk_limited(boom, path, base)
+
+    @property
+    def limits_jerk(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True)
+class TimeOptimal(TimingProfile):
+    """Shortest motion along the path within the limits of joints and drives."""
+
+    name = Profile.TIME_OPTIMAL
+    jerk_bound: bool = False
+    """Keep the jerk limits as well, with no acceleration at the ends."""
+    average_torque: bool = False
+    """Keep the gearboxes' average torque as well."""
+
+    def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        from planner.timing.profiles.average_torque import within_average_torque
+        from planner.timing.profiles.time_optimal import time_optimal, with_jerk_bound
+
+        law = within_average_torque(boom, path, base) if self.average_torque else time_optimal(boom, path, base)
+        if not self.jerk_bound:
+            return law
+        smooth = with_jerk_bound(boom, path, law, base)
+        if self.average_torque:
+            return smooth
+        from planner.timing.profiles.jerk_limited import evenly_limited
+
+        return min(smooth, evenly_limited(boom, path, base)[0], key=lambda each: each.duration)
+
+    @property
+    def limits_jerk(self) -> bool:
+        return self.jerk_bound
+
+    @property
+    def limits_average_torque(self) -> bool:
+        return self.average_torque
+
+    @property
+    def exact_on_lines(self) -> bool:
+        return False
+
+
+PROFILES: Mapping[str, type[TimingProfile]] = MappingProxyType(
+    {kind.name: kind for kind in (Cubic, Quintic, Trapezoidal, JerkLimited, TimeOptimal)}
+)
+"""Each profile by its word."""
+
+
+def parse_profile(
+    word: str, *, jerk_bound: bool = False, average_torque: bool = False, velocities: ArrayLike | None = None
+) -> TimingProfile:
+    """A profile from its word and the options that the command and mission files give beside it.
+
+    Raises:
+        InputError: no such profile, an option of another profile, or velocities that are not finite or not (k, 5).
+    """
+    kind = PROFILES.get(word)
+    if kind is None:
+        raise InputError(f"profile is {str(word)!r}; there are: {', '.join(PROFILES)}")
+    for name, given in (("jerk_bound", jerk_bound), ("average_torque", average_torque)):
+        if given and kind is not TimeOptimal:
+            raise InputError(f"{name} is for the time-optimal profile, not for {word}")
+    if velocities is not None:
+        cubic = Cubic.with_velocities(velocities)
+        if kind is not Cubic:
+            raise InputError(f"velocities at waypoints are for the cubic profile, not for {word}")
+        return cubic
+    return TimeOptimal(jerk_bound, average_torque) if kind is TimeOptimal else kind()
