@@ -64,7 +64,7 @@ class Solutions:
     best: int | None
     """Index of the branch within the limits that is nearest to the reference, or has the least cost; None without one."""
     pitch: float
-    """[rad]; the one chosen where it was left free."""
+    """[rad]; the one chosen where it was left free. One of more than a turn is given without its whole turns."""
 
 
 def inverse_kinematics(
@@ -95,7 +95,8 @@ def inverse_kinematics(
     position = checked("position", position)
     if position.shape != (3,):
         raise InputError(f"position has shape {position.shape}; it must be (3,)")
-    pitch = _free_pitch(boom, position, hold) if pitch is None else scalar("pitch", pitch)
+    # Whole turns are taken off first, because their digits would be missing in the joints' angles.
+    pitch = _free_pitch(boom, position, hold) if pitch is None else float(np.fmod(scalar("pitch", pitch), 2.0 * np.pi))
     found = solve_branches(boom, position, pitch, hold)
     free = not position[:2].any()
     note = ("the target is on the yaw axis: yaw is free, 0 is chosen",) if free else ()

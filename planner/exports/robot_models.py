@@ -74,8 +74,9 @@ def urdf(boom: Boom) -> str:
     """The boom as URDF: a tree, in which the parallelogram is kept by mimic joints.
 
     Position and velocity limits are the boom's. Effort limits are what the drives allow at rest with their margin, and
-    UNLIMITED_EFFORT where no drive is given. The coupled limit of lower - inner and the drives' reflected inertia have no place
-    in URDF.
+    UNLIMITED_EFFORT where no drive is given. Each of the five joints has a transmission, which makes it an actuator in Drake
+    and ros_control; its ratio is 1, because efforts are the joint's own. The coupled limit of lower - inner and the drives'
+    reflected inertia have no place in URDF.
     """
     top = Element("robot", name=boom.name)
     for text in (
@@ -93,6 +94,8 @@ def urdf(boom: Boom) -> str:
     for link in _tree(boom):
         _urdf_link(top, boom, link.name)
         _urdf_joint(top, boom, link)
+    for joint in JOINTS:
+        _urdf_transmission(top, joint)
     return _document(top)
 
 
@@ -127,12 +130,13 @@ def mjcf(boom: Boom) -> str:
         pose = {"pos": _text(link.position), "xyaxes": _text(link.rotation[:, :2].T)}
         bodies[link.name] = SubElement(bodies[link.parent], "body", pose, name=link.name)
         _mjcf_body(bodies[link.name], boom, link)
-    SubElement(bodies["outer"], "site", name="pin_7_outer", pos=_text((boom.geometry.L4, 0.0, 0.0)), size="0.01")
-    SubElement(bodies["upper"], "site", name="pin_7_upper", pos=_text((0.0, boom.geometry.L5, 0.0)), size="0.01")
     equality = SubElement(top, "equality")
     # The stiffest constraint that MuJoCo has: it yields to a ten-thousandth of the acceleration that it stops.
     stiff = {"solref": "0.002 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
-    SubElement(equality, "connect", stiff, name="pin_7", site1="pin_7_outer", site2="pin_7_upper")
+    # By bodies and an anchor, because Drake ignores sites. The anchor is in body1; MuJoCo finds the place in body2 with all
+    # joints at 0, where the loop is closed.
+    pin = {"body1": "outer", "body2": "upper", "anchor": _text((boom.geometry.L4, 0.0, 0.0))}
+    SubElement(equality, "connect", {**pin, **stiff}, name="pin_7")
     actuators = SubElement(top, "actuator")
     for i, joint in enumerate(JOINTS):
         limit = _effort(boom, i)
@@ -336,6 +340,16 @@ def _urdf_joint(top: Element, boom: Boom, link: _Link) -> None:
     elif boom.friction.origins[followed] is not None:
         friction = boom.friction.viscous[followed], boom.friction.coulomb[followed]
         SubElement(element, "dynamics", damping=_text(friction[0]), friction=_text(friction[1]))
+
+
+def _urdf_transmission(top: Element, joint: str) -> None:
+    """An actuator that acts on the joint itself: its effort is the joint's torque."""
+    element = SubElement(top, "transmission", name=f"{joint}_transmission")
+    SubElement(element, "type").text = "transmission_interface/SimpleTransmission"
+    driven = SubElement(element, "joint", name=joint)
+    SubElement(driven, "hardwareInterface").text = "hardware_interface/EffortJointInterface"
+    actuator = SubElement(element, "actuator", name=joint)
+    SubElement(actuator, "mechanicalReduction").text = "1"
 
 
 def _rpy(R: Array) -> tuple[float, float, float]:

@@ -1,12 +1,16 @@
-"""How near the arm comes to what it must keep away from (coal, the collision library of Pinocchio)."""
+"""How near the arm comes to what it must keep away from.
+
+Distances are coal's, the collision library of Pinocchio. It is an extra, keep-out: it is large, and most booms have no shapes.
+"""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from types import ModuleType
+from typing import Any, cast
 
 import numpy as np
 
-from boom_model import Boom, InfeasibleError
+from boom_model import Boom, InfeasibleError, InputError
 from boom_model.arrays import Array
 from boom_model.keep_out import Box, Capsule
 from boom_model.kinematics.frames import frame_transforms
@@ -44,7 +48,11 @@ def link_lines(boom: Boom, q: Array) -> Array:
 
 
 def clearance(boom: Boom, q: Array) -> Clearance:
-    """The nearest approach of the arm at q (5,) to a shape of `boom.keep_out`, which must be given."""
+    """The nearest approach of the arm at q (5,) to a shape of `boom.keep_out`, which must be given.
+
+    Raises:
+        InputError: coal is not installed; names the extra that brings it. So do all functions here that measure distances.
+    """
     return _nearest(boom, _distances(boom, q[None])[0])
 
 
@@ -141,35 +149,40 @@ def _reach(boom: Boom) -> Array:
 
 def _distances(boom: Boom, q: Array) -> Array:
     """Distance [m] of every link to every shape at q (n, 5): (n, 7, shapes)."""
-    import coal
-
-    keep = boom.keep_out
+    coal, keep = _coal(), boom.keep_out
     assert keep is not None
-    still = [_solid(shape) for shape in keep.shapes]
+    still = [_solid(coal, shape) for shape in keep.shapes]
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     found = np.empty((len(q), len(LINKS), len(still)))
     for i, pose in enumerate(link_lines(boom, q)):
         for k, (start, end) in enumerate(pose):
-            link = _rounded(start, end, keep.payload_radius if LINKS[k] == "payload" else keep.link_radius)
+            link = _rounded(coal, start, end, keep.payload_radius if LINKS[k] == "payload" else keep.link_radius)
             for m, shape in enumerate(still):
                 result.clear()
                 found[i, k, m] = coal.distance(*link, *shape, request, result)
     return found
 
 
-def _solid(shape: Box | Capsule) -> tuple[Any, Any]:
-    """coal's shape and where it is."""
-    import coal
+def _coal() -> ModuleType:
+    try:
+        import coal
+    except ModuleNotFoundError:
+        raise InputError(
+            "the boom's file has shapes to keep away from (keep_out), which need the extra keep-out: "
+            "run pip install '.[keep-out]' in the folder of boom"
+        ) from None
+    return cast(ModuleType, coal)
 
+
+def _solid(coal: ModuleType, shape: Box | Capsule) -> tuple[Any, Any]:
+    """coal's shape and where it is."""
     if isinstance(shape, Capsule):
-        return _rounded(shape.start, shape.end, shape.radius)
+        return _rounded(coal, shape.start, shape.end, shape.radius)
     return coal.Box(*shape.size), coal.Transform3s(np.eye(3), shape.center)
 
 
-def _rounded(start: Array, end: Array, radius: float) -> tuple[Any, Any]:
+def _rounded(coal: ModuleType, start: Array, end: Array, radius: float) -> tuple[Any, Any]:
     """The capsule about a line, or the ball about a point, and where it is; coal's capsule lies along z."""
-    import coal
-
     axis = end - start
     length = float(np.linalg.norm(axis))
     middle = (start + end) / 2.0

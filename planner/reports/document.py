@@ -7,7 +7,7 @@ from base64 import b64encode
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from html import escape
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +23,7 @@ FORMS = (".md", ".html", ".pdf")
 _TEXT = 8  # [pt]
 _PADDING = 0.6  # [mm]
 _WITH_HEADING = 25.0  # [mm], what stands on the page of a heading at least
-_LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "control", "coal")
+_LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "control")
 _STYLE = (
     "body{font-family:sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;font-size:.85em}td,th{border:1px solid #bbb;padding:.25em .5em;text-align:left}"
@@ -57,8 +57,7 @@ def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figu
     require_form(str(path))
     path = Path(path)
     drawn = {title: _png(figure) for title, figure in pictures.items()}
-    versions = ", ".join(f"{name} {version(name)}" for name in ("boom", *_LIBRARIES))
-    made = f"Made by `{command_line()}` with {versions}, Python {sys.version.split()[0]}."
+    made = f"Made by `{command_line()}` with {', '.join(_versions())}, Python {sys.version.split()[0]}."
     with ExitStack() as moved:  # every file is whole before the first takes its place
 
         def write(place: Path, data: bytes) -> None:
@@ -75,6 +74,14 @@ def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figu
             write(path, _html(path.stem, markdown, drawn, made).encode())
         else:
             write(path, _pdf(markdown, drawn, made))
+
+
+def _versions() -> list[str]:
+    found = [f"{name} {version(name)}" for name in ("boom", *_LIBRARIES)]
+    try:
+        return [*found, f"coal {version('coal')}"]
+    except PackageNotFoundError:  # it comes with the extra keep-out
+        return found
 
 
 def _html(title: str, markdown: str, drawn: Mapping[str, bytes], made: str) -> str:

@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
+import yourdfpy
 
-from boom_model import JOINTS, Boom, InputError, forward_kinematics, inverse_dynamics, mass_matrix
+from boom_model import JOINTS, Boom, InputError, forward_kinematics, gravity_torque, inverse_dynamics, mass_matrix
 from boom_model.arrays import Array
 from boom_model.boom import Body
 from boom_model.drives.drive import drive_torque_limit, reflected_inertia
@@ -93,6 +94,50 @@ def test_urdf_mimic_joints_may_go_where_their_joint_goes():
             np.testing.assert_allclose([float(limit.get("lower")), float(limit.get("upper"))], ends, atol=1e-15)
 
 
+@pytest.fixture(scope="module")
+def in_yourdfpy(tmp_path_factory: pytest.TempPathFactory) -> yourdfpy.URDF:
+    file = tmp_path_factory.mktemp("urdf") / "boom.urdf"
+    write_model(BOOM, file)
+    return yourdfpy.URDF.load(file)
+
+
+def test_urdf_has_the_same_joints_limits_and_masses_in_yourdfpy(in_yourdfpy: yourdfpy.URDF):
+    assert set(in_yourdfpy.actuated_joint_names) == set(JOINTS)  # the mimic joints are none
+    for i, name in enumerate(JOINTS):
+        limit, drive = in_yourdfpy.joint_map[name].limit, BOOM.drives[i]
+        effort = UNLIMITED_EFFORT if drive is None else float(drive_torque_limit(drive, 0.0))
+        expected = BOOM.limits.lower[i], BOOM.limits.upper[i], BOOM.limits.velocity[i], effort
+        assert (limit.lower, limit.upper, limit.velocity, limit.effort) == pytest.approx(expected, rel=1e-15)
+    masses = {name: link.inertial.mass for name, link in in_yourdfpy.link_map.items() if link.inertial}
+    assert masses == {**{name: body.mass for name, body in BOOM.bodies.items()}, "tip": BOOM.payload.mass}
+
+
+def test_every_joint_of_the_urdf_has_a_transmission_of_ratio_1():
+    found = ElementTree.fromstring(urdf(BOOM)).findall("transmission")
+    assert [(each.find("joint").get("name"), each.find("actuator").get("name")) for each in found] == [(j, j) for j in JOINTS]
+    assert {each.findtext("actuator/mechanicalReduction") for each in found} == {"1"}
+    assert {each.findtext("joint/hardwareInterface") for each in found} == {"hardware_interface/EffortJointInterface"}
+
+
+def test_urdf_has_the_models_tip_and_gravity_torques_in_yourdfpy(in_yourdfpy: yourdfpy.URDF):
+    """yourdfpy has no dynamics: gravity torques are the differences of the height of its masses."""
+    robot, h = in_yourdfpy, 1e-4
+
+    def placed(q: Array) -> dict[str, Array]:
+        robot.update_cfg(dict(zip(JOINTS, q, strict=True)))
+        return {name: robot.get_transform(name) for name in robot.link_map}
+
+    def energy(q: Array) -> float:
+        frames = placed(q)
+        masses = [(robot.link_map[name].inertial, frame) for name, frame in frames.items()]
+        return sum(BOOM.gravity * own.mass * (frame @ own.origin @ [0, 0, 0, 1])[2] for own, frame in masses if own)
+
+    for q in random_states(BOOM, 5, np.random.default_rng(13))[0]:
+        np.testing.assert_allclose(placed(q)["tip"][:3, 3], forward_kinematics(BOOM, q).position, rtol=0, atol=1e-14)
+        found = [(energy(q + step) - energy(q - step)) / (2.0 * h) for step in h * np.eye(5)]
+        np.testing.assert_allclose(found, gravity_torque(BOOM, q), rtol=0, atol=1e-6)
+
+
 def test_urdf_says_what_it_cannot_hold():
     text = urdf(BOOM)
     for sentence in ("cannot close a loop", "belongs to the joint it mimics", "at least 0.0872665 rad", "not measured"):
@@ -135,7 +180,10 @@ def followed() -> tuple[Simulated, Array]:
     ahead = inverse_dynamics(BOOM, move.q, move.qd, move.qdd, friction=True, drive_inertia=True)
     M = mass_matrix(BOOM, move.q, drive_inertia=True)
     set_pose(model, data, move.q[0], move.qd[0])
-    halves = [model.site(f"pin_7_{link}").id for link in ("outer", "upper")]
+    halves = [
+        (model.body(link).id, anchor)
+        for link, anchor in zip(("outer", "upper"), model.eq_data[0, :6].reshape(2, 3), strict=True)
+    ]
     tracking, correction, gap, pin = [], [], [], []
     for k in range(len(move.t) - 1):
         error, rate = move.q[k] - data.qpos[ids], move.qd[k] - data.qvel[ids]
@@ -143,7 +191,8 @@ def followed() -> tuple[Simulated, Array]:
         data.ctrl[:] = ahead.tau[k] + correction[-1]
         mujoco.mj_step(model, data)
         tracking.append(error)
-        gap.append(np.ptp(data.site_xpos[halves], axis=0).max())
+        outer, upper = (data.xpos[body] + data.xmat[body].reshape(3, 3) @ anchor for body, anchor in halves)
+        gap.append(np.abs(outer - upper).max())
         pin.append(-data.efc_force[:3])  # the constraint pushes the first body, the outer link
     c, s = np.cos(move.q[:-1, 0]), np.sin(move.q[:-1, 0])
     x, _, z = ahead.pins.frame_7[:-1].T

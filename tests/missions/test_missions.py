@@ -12,6 +12,7 @@ from planner.missions.mission import check_cycle, load_mission, named_missions, 
 from planner.motion.trajectory import joined
 from planner.motion.vehicle import load_case
 from planner.planning import torques
+from tests.field_day import field_day
 
 BOOM = Boom.load()
 HEAD = 'name = "mine"\nbasis = "assumed"\nsource = "this test"\nstart = "transport"\n'
@@ -112,7 +113,7 @@ def test_legs_go_on_from_each_other(mission):
 
 
 def test_the_field_day_sweeps_its_plots():
-    cycle = plan_cycle(BOOM, load_mission("field-day"))
+    cycle = field_day()
     sweeps = {leg.label: (n, leg) for leg, n in zip(cycle.legs, cycle.counts, strict=True) if "line" in leg.label}
     assert {n for n, _ in sweeps.values()} == {20}
     for _, leg in sweeps.values():

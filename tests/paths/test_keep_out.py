@@ -1,5 +1,6 @@
 """Shapes to keep away from: distances by convex search in place of a collision library, detours, refusals, the file's table."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -212,6 +213,30 @@ def test_nothing_changes_without_shapes_or_with_shapes_out_of_the_way(profile):
     plain, with_barn = (plan(boom, "transport", "phenotyping", profile=profile) for boom in (BOOM, far))
     np.testing.assert_array_equal(plain.trajectory.q, with_barn.trajectory.q)
     assert plain.report.notes == with_barn.report.notes
+
+
+@pytest.fixture
+def without_coal(monkeypatch):
+    monkeypatch.setitem(sys.modules, "coal", None)
+
+
+@pytest.mark.usefixtures("without_coal")
+def test_without_coal_shapes_name_the_extra_that_they_need(boom, tmp_path):
+    (tmp_path / "mine.toml").write_text(BOOM_FILE.read_text() + TABLE + BOX)
+    code, _, complaint = boom("plan", "transport", "phenotyping", "--boom", "mine.toml")
+    assert code == 2
+    assert complaint.count("\n") == 1
+    assert "pip install '.[keep-out]'" in complaint
+    assert [file.name for file in tmp_path.iterdir()] == ["mine.toml"]
+
+
+@pytest.mark.usefixtures("without_coal")
+def test_without_coal_all_else_works(boom, tmp_path):
+    assert boom("plan", "transport", "phenotyping", "--csv", "move.csv")[0] == 0
+    (tmp_path / "mine.toml").write_text(BOOM_FILE.read_text() + TABLE + BOX)
+    assert boom("torque", "move.csv", "--out", "torques.csv", "--boom", "mine.toml")[0] == 0
+    code, _, complaint = boom("check", "move.csv", "--boom", "mine.toml")
+    assert (code, "extra keep-out" in complaint) == (2, True)
 
 
 TABLE = """

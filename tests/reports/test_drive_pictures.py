@@ -8,9 +8,10 @@ import pytest
 from boom_model import Boom, InputError, tip_deflection
 from boom_model.drives.drive import available_torque, motor_torque
 from planner import plan
-from planner.missions.mission import check_cycle, load_mission, plan_cycle
+from planner.missions.mission import check_cycle
 from planner.planning import torques
 from planner.reports.drive_pictures import drive_figure, write_drive_picture
+from tests.field_day import field_day
 
 BOOM = Boom.load()
 MOVE = plan(BOOM, "transport", "phenotyping", step=0.05)
@@ -60,7 +61,7 @@ def test_the_tips_budget_is_in_millimetres():
 
 
 def test_a_missions_moves_stand_end_to_end():
-    cycle = plan_cycle(BOOM, load_mission("field-day"))
+    cycle = field_day()
     moves = [samples for leg, samples in cycle.slices() if leg.moves]
     panels = drawn(BOOM, cycle.trajectory, torques(BOOM, cycle.trajectory), check_cycle(BOOM, cycle), moves)
     lines = [line for line in panels["inner: CBG320160"].get_lines() if len(line.get_xdata()) > 2]

@@ -24,10 +24,11 @@ from planner.sizing.choice import (
 )
 from planner.sizing.tables import motors, outcome, ranking, saving, sizing_json, sizing_markdown, sizing_notes
 from tests.checks.test_actuator_checks import SCREW
+from tests.field_day import field_day
 
 BOOM = Boom.load()
 CATALOGUE = Catalogue.load()
-CYCLE = plan_cycle(BOOM, load_mission("field-day"))
+CYCLE = field_day()
 MAIN = plan_cycle(BOOM, load_mission("table-3-1"))
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from boom_model.arrays import Array
@@ -89,6 +89,8 @@ def test_a_target_near_the_boom_has_sound_solutions_or_none(position, pitch, hol
 
 @BOUNDED
 @given(position=positions(FINITE), pitch=FINITE, hold=HOLDS)
+@example(position=(0.0, 0.0, 0.0), pitch=6463426.0, hold=LeastExtension())
+@example(position=(0.0, 0.0, 0.0), pitch=190.0, hold=LeastExtension())
 def test_a_target_anywhere_has_sound_solutions_or_none(position, pitch, hold):
     assert_sound(inverse_kinematics(BOOM, position, pitch, hold), position, hold)
 
