@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_VALUE, _LIMIT = "#0072b2", "#d55e00"  # Okabe and Ito's blue and vermilion, which the colour-blind can tell apart
+_VALUE, _LIMIT = "#0072b2", "#d55e00"  # Okabe and Ito's blue and vermilion, readable with colour blindness
 
 
 def move_pictures(boom: Boom, motion: Trajectory, tau: Array) -> dict[str, "Figure"]:
-    """A matplotlib figure for each quantity of a motion with joint torques `tau` (n, 5), by title."""
+    """Return a figure by title for each quantity of a motion with torques `tau` (n, 5)."""
     limits = boom.limits
     return {
         "Positions": _figure(motion, "position", "", motion.q, limits.lower, limits.upper),
@@ -39,7 +39,7 @@ def _figure(motion: Trajectory, name: str, per: str, values: Array, lower: Array
 
 
 def _torques(boom: Boom, motion: Trajectory, tau: Array) -> "Figure":
-    """Torque of each joint with what its drive leaves for it at that time, -T - J qdd to T - J qdd."""
+    """Draw the torque of each joint with the limits of its drive, -T - J qdd and T - J qdd."""
     figure, panels = _panels()
     for i, (joint, axes) in enumerate(zip(JOINTS, panels, strict=True)):
         axes.plot(motion.t, tau[:, i], color=_VALUE)
