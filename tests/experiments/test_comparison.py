@@ -187,7 +187,7 @@ def test_uneven_steps_are_evened_out_and_said_so():
     inner = ready.inside
     assert np.abs(ready.trajectory.qdd - expected)[inner].max() < 1e-3
     assert np.abs(qdd).max() > 0.3
-    assert smoothed(Log.of(np.arange(100) * 0.01, q[:100])).trajectory.notes[0].startswith("velocities")
+    assert smoothed(Log.of(np.arange(100) * 0.01, q[:100])).trajectory.notes[0].startswith("the log has no velocities")
 
 
 def test_notes_say_whose_they_are_and_what_is_assumed():
