@@ -23,7 +23,7 @@ def compared(reports: Mapping[str, Report], joints: Sequence[str]) -> tuple[tupl
     """
     for joint in joints:
         if joint not in (*JOINTS, *_NOT_JOINTS):
-            raise InputError(f"unknown joint {joint!r}; the names are: {', '.join((*JOINTS, *_NOT_JOINTS))}")
+            raise InputError(f"unknown joint {joint!r}; there are: {', '.join((*JOINTS, *_NOT_JOINTS))}")
     by_check: dict[tuple[str, str], dict[str, Row]] = {}
     for name, report in reports.items():
         for row in report.rows:

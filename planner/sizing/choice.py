@@ -356,7 +356,7 @@ def parse_variant(boom: Boom, text: str) -> Boom:
 
 def _index(joint: str) -> int:
     if joint not in JOINTS:
-        raise InputError(f"unknown joint {joint!r}; the joints are: {', '.join(JOINTS)}")
+        raise InputError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
     return JOINTS.index(joint)
 
 
