@@ -49,7 +49,7 @@ class TipDeflection:
 
     @property
     def total(self) -> Array:
-        """(...) largest total displacement [m]: the sum of the sizes of all parts."""
+        """(...) largest total displacement [m]: the sum of the magnitudes of all parts."""
         size: Array = np.linalg.norm(self.wind_up, axis=-1)
         return size + self.backlash + self.hysteresis + self.step
 
@@ -57,7 +57,7 @@ class TipDeflection:
 def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
     """Return the displacement of the tip under joint torques (..., 5) [Nm].
 
-    It is d = J_v dq, to first order. A gearbox yields to the load that its torque holds: dq_i =
+    It is d = J_v dq, to first order. A gearbox yields to the load that its torque balances: dq_i =
     -wind_up(tau_i). Backlash, hysteresis and microstep error are widths of unknown sign: each
     displacement is the largest |sum_i +-J_v,i b_i| over all signs.
 
@@ -116,7 +116,7 @@ def _step_error(drive: Drive) -> float | None:
 def _worst(J: Array, widths: Array) -> Array:
     """Return the largest |sum_i +-J_i w_i| (...) over all signs, for J (..., 3, 5).
 
-    The first sign can be fixed, because the size does not depend on a common sign.
+    The first sign can be fixed, because the magnitude does not depend on a common sign.
     """
     columns = J * widths
     used = np.flatnonzero(widths)

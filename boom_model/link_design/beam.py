@@ -240,7 +240,7 @@ def deflection_coefficients(beam: Beam, M: Array) -> Array:
 
         c = 12 |M| lever dx / (E w)
 
-    This is the moment-area method (thesis, eqs. 3.18-3.36). It uses the size of M, as Appendix D
+    This is the moment-area method (thesis, eqs. 3.18-3.36). It uses |M|, as Appendix D
     does: if the moment changes its sign along the beam, the sum is an upper bound.
     """
     c: Array = 12.0 * np.abs(M) * beam.lever * beam.weights / (beam.material.elastic_modulus * beam.width)

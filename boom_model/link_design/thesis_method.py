@@ -32,7 +32,7 @@ class ThesisLoad:
     """
 
     applied: Array
-    """(2,) sizes of the force at B along x and y [N]. It compresses the link and pushes it down."""
+    """(2,) |force| at B along x and y [N]; the force compresses the link and pushes it down."""
     acceleration: Array
     """(3,) acceleration minus gravity that Appendix D assigns to frame 5 [m/s^2]."""
     angular_velocity: Array
@@ -66,7 +66,7 @@ class ThesisDesign:
     stress: Array
     """(n + 1,) von Mises stress of stage 1 [Pa]"""
     moments: Array
-    """(n + 1,) sizes of the bending moments, frozen after stage 1 [Nm]"""
+    """(n + 1,) absolute bending moments, frozen after stage 1 [Nm]"""
     coefficients: Array
     """(n + 1,) c of the deflection sum c / H^3 [m^4], eq. 3.36"""
     heights: Array

@@ -25,7 +25,7 @@ MOST_MARGIN = 3.0
 
 
 def motor_bundles(move: Move) -> Iterator[Bundle]:
-    """Yield the size of each motor's torque together with its torque-speed limit."""
+    """Yield the absolute torque of each motor together with its torque-speed limit."""
     motion = move.trajectory
     for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
         if drive is None:
@@ -41,7 +41,7 @@ def motor_bundles(move: Move) -> Iterator[Bundle]:
 
 
 def gearbox_bundles(move: Move) -> Iterator[Bundle]:
-    """Yield the size of each gearbox's torque together with its ratings."""
+    """Yield the absolute torque of each gearbox together with its ratings."""
     tau = np.abs(move.loads.tau)
     for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
         if drive is None:

@@ -115,12 +115,12 @@ def part_bundles(parts: Breakdown) -> Iterator[Bundle]:
 
 
 def load_bundles(mount: Mount, loads: Loads) -> Iterator[Bundle]:
-    """Yield the force and the moment on the mount, and the sizes of the pin forces."""
+    """Yield the force and the moment on the mount, and the magnitudes of the pin forces."""
     if loads.mount is None or loads.pins is None:
         return
     for kind, unit, columns, limit in (("force", "N", slice(0, 3), mount.force), ("moment", "Nm", slice(3, 6), mount.moment)):
         vectors = loads.mount[:, columns]
-        names, colors = ["x", "y", "z", "size"], [SKY_BLUE, ORANGE, PURPLE, GREY]
+        names, colors = ["x", "y", "z", "magnitude"], [SKY_BLUE, ORANGE, PURPLE, GREY]
         series = [*vectors.T, np.linalg.norm(vectors, axis=-1)]
         if limit is not None:
             names.append("limit" if limit.origin.basis is Basis.PRINTED else f"limit ({limit.origin.basis})")
@@ -131,4 +131,4 @@ def load_bundles(mount: Mount, loads: Loads) -> Iterator[Bundle]:
     pins = {6: loads.pins.frame_6, 7: loads.pins.frame_7, 8: loads.pins.frame_8}
     sizes = np.stack([np.linalg.norm(force, axis=-1) for force in pins.values()], axis=-1)
     names = [f"pin {pin} [N]" for pin in pins]
-    yield Bundle("plots/pins", "size of the pin forces [N]", names, [YELLOW, GREEN, SKY_BLUE], sizes)
+    yield Bundle("plots/pins", "magnitude of the pin forces [N]", names, [YELLOW, GREEN, SKY_BLUE], sizes)
