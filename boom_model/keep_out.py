@@ -1,4 +1,4 @@
-"""Shapes that the arm must keep away from, such as the ground and the vehicle's body."""
+"""Shapes that the arm must keep away from, such as the ground and the body of the vehicle."""
 
 from dataclasses import dataclass
 
@@ -14,13 +14,13 @@ class Box:
     center: Array
     """(3,) [m]"""
     size: Array
-    """(3,) whole lengths [m]."""
+    """(3,) full edge lengths [m]."""
     origin: Origin
 
 
 @dataclass(frozen=True, eq=False)
 class Capsule:
-    """All that is within `radius` of the line from start to end, in frame 1."""
+    """All points within `radius` [m] of the line from start to end, in frame 1."""
 
     name: str
     start: Array
@@ -33,14 +33,14 @@ class Capsule:
 
 @dataclass(frozen=True, eq=False)
 class KeepOut:
-    """What the arm must keep away from, and how thick the arm is taken to be."""
+    """The keep-out shapes, and the thickness assumed for the arm."""
 
     shapes: tuple[Box | Capsule, ...]
     clearance: float
-    """Least distance [m] between arm and shapes."""
+    """Least distance between arm and shapes [m]."""
     link_radius: float
-    """Each link is taken as a capsule of this radius [m] about the line between its pins."""
+    """Radius [m] of the capsule about the line between its pins that stands for each link."""
     payload_radius: float
-    """The payload is taken as a ball of this radius [m] about the tip."""
+    """Radius [m] of the ball about the tip that stands for the payload."""
     origin: Origin
-    """Of the three lengths."""
+    """Origin of the three lengths."""

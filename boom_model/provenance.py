@@ -1,4 +1,4 @@
-"""Where a figure comes from: printed in a source, estimated from printed figures, or assumed."""
+"""Provenance of a value: printed in a source, estimated from printed values, or assumed."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Basis(StrEnum):
-    """How far a figure can be trusted, strongest first."""
+    """Reliability of a value, the most reliable first."""
 
     PRINTED = "printed"
     ESTIMATED = "estimated"
@@ -17,14 +17,17 @@ class Basis(StrEnum):
 
     @staticmethod
     def weakest(bases: "Iterable[Basis]") -> "Basis":
-        """A result is as good as the weakest figure that decides it."""
+        """Return the weakest basis.
+
+        A result is only as reliable as the weakest value that decides it.
+        """
         order = list(Basis)
         return max(bases, key=order.index, default=Basis.PRINTED)
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Basis and source of a figure."""
+    """Basis and source of a value."""
 
     basis: Basis
     source: str
@@ -32,7 +35,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Sourced(Generic[T]):
-    """A value that travels with its origin."""
+    """A value with its origin."""
 
     value: T
     origin: Origin

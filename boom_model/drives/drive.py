@@ -1,4 +1,4 @@
-"""Motor, gearbox and drive: what their datasheets allow, and what a joint torque asks of them."""
+"""Motor, gearbox and drive: datasheet limits, and the motor torque for a joint torque."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -11,14 +11,17 @@ from boom_model.provenance import Origin, Sourced
 
 
 class Wiring(StrEnum):
-    """How the two halves of each phase of an 8-lead stepper are joined."""
+    """Connection of the two halves of each phase of an 8-lead stepper motor."""
 
     PARALLEL = "parallel"
     SERIES = "series"
 
 
 STEPPER_MARGIN = 0.5
-"""(available - required) / required that a stepper's torque should keep: the field's rule of thumb for pull-out."""
+"""Required (available - required) / required torque of a stepper motor.
+
+It is the usual rule of thumb against pull-out.
+"""
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,7 @@ class Winding:
     """Electrical data of a motor in one wiring."""
 
     current: float
-    """Phase current [A, rms]."""
+    """RMS phase current [A]."""
     resistance: float
     """Phase resistance [ohm]."""
     inductance: float
@@ -35,7 +38,7 @@ class Winding:
 
 @dataclass(frozen=True)
 class Motor:
-    """Hybrid stepper. None stands for what the datasheet does not print."""
+    """Hybrid stepper motor. None stands for a value that the datasheet does not print."""
 
     name: str
     source: str
@@ -44,7 +47,7 @@ class Motor:
     max_voltage: float | None
     holding_torque: float | None
     running_torque: float | None
-    """Torque while turning slowly [Nm]."""
+    """Torque at low speed [Nm]."""
     mass: float | None
     rotor_inertia: float | None
     """[kg m^2]"""
@@ -53,12 +56,15 @@ class Motor:
     microstep_accuracy: float | None
     """Largest error of a microstep without load [rad]."""
     tolerance: float | None
-    """Share by which a motor may differ from its sheet."""
+    """Fraction by which a motor may differ from its datasheet."""
 
 
 @dataclass(frozen=True)
 class Gearbox:
-    """Strain-wave gearbox, torques at the output unless said otherwise. None stands for what is not printed."""
+    """Strain-wave gearbox, with torques at the output unless stated otherwise.
+
+    None stands for a value that the datasheet does not print.
+    """
 
     name: str
     source: str
@@ -68,57 +74,60 @@ class Gearbox:
     max_average_torque: float | None
     peak_torque: float | None
     efficiency: float | None
-    """Share of the input power that leaves, 0 to 1."""
+    """Output power over input power, 0 to 1."""
     no_load_input_torque: float | None
     starting_torque: float | None
     backdrive_torque: float | None
     mass: float | None
     input_inertia: float | None
-    """[kg m^2] at the input."""
+    """Inertia at the input [kg m^2]."""
     torsion_torques: tuple[float, float] | None
-    """T1, T2 [Nm]: where the stiffness changes."""
+    """Torques T1 and T2 at which the stiffness changes [Nm]."""
     torsion_stiffness: tuple[float, float, float] | None
-    """K1, K2, K3 [Nm/rad]."""
+    """Stiffness K1, K2 and K3 of the three ranges [Nm/rad]."""
     backlash: float | None
     """[rad]"""
     hysteresis: float | None
     """[rad]"""
     max_input_speed: float | None
-    """[rad/s] at the input."""
+    """Largest speed at the input [rad/s]."""
     max_average_input_speed: float | None
-    """[rad/s] at the input."""
+    """Largest average speed at the input [rad/s]."""
     rated_life: float | None
-    """L50, which half of them reach at continuous torque and rated input speed [s]."""
+    """Life L50 at continuous torque and rated input speed [s]: half of the gearboxes reach it."""
     rated_input_speed: float | None
-    """[rad/s] at the input."""
+    """Input speed of the rated life [rad/s]."""
 
 
 @dataclass(frozen=True)
 class Drive:
-    """A motor on a gearbox, as it is wired and fed. Without voltage or wiring only low speed can be judged."""
+    """A motor with a gearbox, its wiring and its bus voltage.
+
+    Without voltage or wiring, only the torque at low speed is known.
+    """
 
     motor: Motor
     gearbox: Gearbox
     bus_voltage: Sourced[float] | None
     wiring: Sourced[Wiring] | None
     brake: Sourced[bool] | None = None
-    """Whether a brake holds the joint without power; None where nobody says."""
+    """Whether a brake holds the joint without power; None if unknown."""
 
     @property
     def winding(self) -> Winding | None:
-        """The motor's data in the wiring chosen; None where either is not given."""
+        """Data of the motor in the chosen wiring; None if the wiring or its data is unknown."""
         if self.wiring is None:
             return None
         return self.motor.parallel if self.wiring.value is Wiring.PARALLEL else self.motor.series
 
     @property
     def supply_origins(self) -> tuple[Origin, ...]:
-        """Origins of bus voltage and wiring, as far as they are given."""
+        """Origins of bus voltage and wiring, where they are given."""
         return tuple(s.origin for s in (self.bus_voltage, self.wiring) if s is not None)
 
 
 def reflected_inertia(drive: Drive) -> float | None:
-    """N^2 (J_rotor + J_gear) [kg m^2] at the joint; None where a datasheet lacks one of them."""
+    """Return N^2 (J_rotor + J_gear) [kg m^2] at the joint, or None if an inertia is missing."""
     rotor, gear = drive.motor.rotor_inertia, drive.gearbox.input_inertia
     if rotor is None or gear is None:
         return None
@@ -126,12 +135,15 @@ def reflected_inertia(drive: Drive) -> float | None:
 
 
 def available_torque(drive: Drive, speed: ArrayLike) -> Array | None:
-    """Motor torque that the torque-speed curve leaves at `speed` [rad/s], in Nm, shape of `speed`.
+    """Return the torque [Nm] available at a motor speed [rad/s], in the shape of `speed`.
 
-        T = T_run min(1, V / sqrt((R I_p + K_m w)^2 + (p w L I_p)^2)),  I_p = sqrt(2) I,  K_m = T_run / I_p,
+        T = T_run min(1, V / sqrt((R I_p + K_m w)^2 + (p w L I_p)^2)),
+        I_p = sqrt(2) I,  K_m = T_run / I_p
 
-    p = 50 for a 1.8 degree step (pole pairs: a quarter of the steps in a turn). The datasheet's curve is a picture, so this
-    is an estimate of our own: it leaves out iron loss, detent and resonance. None without voltage, wiring or motor data.
+    p = 50 for a 1.8 degree step: the number of pole pairs is a quarter of the number of steps per
+    turn. The datasheet prints its torque-speed curve only as a picture, so this is an estimate of
+    our own. It neglects iron losses, detent torque and resonance. Return None without voltage,
+    wiring or motor data.
     """
     terms = _curve_terms(drive)
     if terms is None or drive.motor.running_torque is None:
@@ -144,10 +156,12 @@ def available_torque(drive: Drive, speed: ArrayLike) -> Array | None:
 
 
 def speed_for_torque(drive: Drive, torque: ArrayLike) -> Array | None:
-    """Highest motor speed [rad/s] at which `available_torque` is at least `torque` [Nm], shape of `torque`.
+    """Return the highest motor speed [rad/s] at which `available_torque` is at least `torque` [Nm].
 
-    Solves (R I_p + K_m w)^2 + (p w L I_p)^2 = (V T_run / T)^2, a quadratic in w. For T = T_run this is the corner speed; it
-    is 0 where no speed gives the torque and infinite where none is asked. None without voltage, wiring or motor data.
+    It solves (R I_p + K_m w)^2 + (p w L I_p)^2 = (V T_run / T)^2, a quadratic equation in w, and
+    has the shape of `torque`. For T = T_run this is the corner speed. The speed is 0 if no speed
+    gives the torque, and infinite if the torque is 0. Return None without voltage, wiring or motor
+    data.
     """
     terms, running = _curve_terms(drive), drive.motor.running_torque
     if terms is None or running is None:
@@ -180,11 +194,13 @@ def _curve_terms(drive: Drive) -> tuple[float, float, float, float] | None:
 
 
 def mesh_efficiency(gearbox: Gearbox) -> float | None:
-    """Efficiency of the mesh alone, if the printed one already contains the no-load torque at rated torque.
+    """Return the efficiency of the gear mesh alone.
 
         eta_mesh = (T_rated / N) / (T_rated / (N eta) - T_noload)
 
-    so that T_rated / (N eta_mesh) + T_noload = T_rated / (N eta). None where a figure is missing, or no mesh is that good.
+    This assumes that the printed efficiency already includes the no-load torque at rated torque:
+    T_rated / (N eta_mesh) + T_noload = T_rated / (N eta). Return None if a value is missing, or if
+    eta_mesh would exceed 1.
     """
     rated, eta, no_load = gearbox.continuous_torque, gearbox.efficiency, gearbox.no_load_input_torque
     if rated is None or eta is None or no_load is None:
@@ -197,14 +213,16 @@ def mesh_efficiency(gearbox: Gearbox) -> float | None:
 def motor_torque(
     drive: Drive, tau: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, no_load_in_efficiency: bool = False
 ) -> Array | None:
-    """Torque at the motor [Nm] for joint torque `tau` [Nm] at `qd` [rad/s] and `qdd` [rad/s^2]; signed like `tau`.
+    """Return the motor torque [Nm] for joint torque `tau` [Nm], `qd` [rad/s] and `qdd` [rad/s^2].
 
         driving (tau qd > 0):  tau / (N eta) + sign(qd) T_noload + (J_rotor + J_gear) N qdd
         braking or holding:    tau / N                           + (J_rotor + J_gear) N qdd
 
-    The no-load torque is added to the efficiency's loss, the conservative reading of the sheet; with `no_load_in_efficiency`
-    eta is `mesh_efficiency`, the other reading. Friction earns no credit while braking (our own derivation, in the manner of
-    Harmonic Drive's selection pages). About tau = 0 it jumps by T_noload. None where a figure is missing.
+    It has the sign convention of `tau`. By default the no-load torque is added to the loss of the
+    efficiency, which is the conservative reading of the datasheet. With `no_load_in_efficiency`,
+    eta is `mesh_efficiency`, the other reading. Friction is not credited while braking. This is our
+    own derivation, similar to Harmonic Drive's selection pages. The torque jumps by T_noload at tau
+    = 0. Return None if a value is missing.
     """
     gear, inertia = drive.gearbox, reflected_inertia(drive)
     efficiency = mesh_efficiency(gear) if no_load_in_efficiency else gear.efficiency
@@ -219,17 +237,23 @@ def motor_torque(
 
 
 def drive_inertia(drive: Drive) -> float:
-    """What the drive's own inertia adds at the joint while driving: eta N^2 (J_rotor + J_gear) [kg m^2]; 0 if not given."""
+    """Return the drive's own inertia at the joint while driving.
+
+        eta N^2 (J_rotor + J_gear) [kg m^2]
+
+    Missing inertias count as 0, a missing efficiency as 1.
+    """
     return (drive.gearbox.efficiency or 1.0) * (reflected_inertia(drive) or 0.0)
 
 
 def motor_limit(drive: Drive, speed: ArrayLike) -> Array | None:
-    """Joint torque [Nm] that the motor drives at a joint speed [rad/s], shape of `speed`; None where a figure is missing.
+    """Return the joint torque [Nm] that the motor allows at a joint speed [rad/s], of its shape.
 
         (T_available(N speed) / (1 + margin) - T_noload) N eta
 
-    bounds |tau + eta N^2 (J_rotor + J_gear) qdd|, friction being part of tau. Without voltage or wiring the running torque
-    stands for the curve: then the limit is necessary, not sufficient, above low speed.
+    This bounds |tau + eta N^2 (J_rotor + J_gear) qdd|, where friction is part of tau. Without
+    voltage or wiring, the running torque replaces the torque-speed curve; above low speed the limit
+    is then necessary but not sufficient. Return None if a value is missing.
     """
     gear, w = drive.gearbox, drive.gearbox.ratio * np.asarray(speed, dtype=float)
     curve = available_torque(drive, w)
@@ -242,9 +266,10 @@ def motor_limit(drive: Drive, speed: ArrayLike) -> Array | None:
 
 
 def drive_torque_limit(drive: Drive, speed: ArrayLike) -> Array | None:
-    """Joint torque [Nm] that motor and gearbox allow at a joint speed [rad/s], at no acceleration; None without any figure.
+    """Return the joint torque [Nm] that the drive allows at a joint speed [rad/s], for qdd = 0.
 
-    The lesser of `motor_limit` and the gearbox's start-stop torque, which bounds |tau| alone: the rotor is before the gears.
+    It is the smaller of `motor_limit` and the gearbox's start-stop torque. The latter bounds |tau|
+    alone, because the rotor is on the input side of the gears. Return None if neither is known.
     """
     limits = [] if (motor := motor_limit(drive, speed)) is None else [motor]
     if drive.gearbox.start_stop_torque is not None:
@@ -256,11 +281,12 @@ def drive_torque_limit(drive: Drive, speed: ArrayLike) -> Array | None:
 
 
 def drive_torque_tangent(drive: Drive, speed: ArrayLike) -> tuple[Array, Array] | None:
-    """Intercept [Nm] and slope [Nm s^2/rad^2] of a line in the square of the joint speed, below the drive's torque curve.
+    """Return intercept [Nm] and slope [Nm s^2/rad^2] of a line in qd^2 below the torque curve.
 
-    The motor's curve is a convex function of the speed squared beyond its corner, so its tangent at `speed` (or at the
-    corner, where that is faster) lies below it everywhere beyond, and with `motor_limit` at rest as a second bound it never
-    allows more than the curve does. None without the figures that make a curve.
+    Beyond its corner, the motor's torque curve is a convex function of the squared speed. Its
+    tangent at `speed`, or at the corner if that is faster, is therefore below it everywhere beyond
+    the corner. Together with `motor_limit` at rest as a second bound, it never allows more than the
+    curve. Return None if the curve is unknown.
     """
     terms, gear = _curve_terms(drive), drive.gearbox
     running = drive.motor.running_torque

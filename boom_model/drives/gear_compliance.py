@@ -1,4 +1,4 @@
-"""How far a strain-wave gearbox gives under its torque, and what that costs at the tip."""
+"""Wind-up of strain-wave gearboxes under torque, and the resulting deflection of the tip."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -13,13 +13,14 @@ from boom_model.kinematics.forward import jacobian
 
 
 def wind_up(gearbox: Gearbox, torque: ArrayLike) -> Array | None:
-    """Angle [rad] by which the output lags the input under a torque [Nm], signed like the torque and of its shape.
+    """Return the angle [rad] by which the output lags the input under a torque [Nm].
 
         |T| <= T1:       T / K1
         T1 < |T| <= T2:  T1 / K1 + (T - T1) / K2
         |T| > T2:        T1 / K1 + (T2 - T1) / K2 + (T - T2) / K3
 
-    The makers' three-piece curve (thesis, Appendix E, "Torsional Stiffness"). None where the curve is not printed.
+    The angle has the sign and the shape of the torque. This is the makers' curve of three linear
+    pieces (thesis, Appendix E, "Torsional Stiffness"). Return None if the curve is not printed.
     """
     if gearbox.torsion_torques is None or gearbox.torsion_stiffness is None:
         return None
@@ -33,31 +34,32 @@ def wind_up(gearbox: Gearbox, torque: ArrayLike) -> Array | None:
 
 @dataclass(frozen=True, eq=False)
 class TipDeflection:
-    """Where the tip is against where the rigid model puts it, by the drives of the joints alone."""
+    """Deviation of the tip from the rigid model, caused by the drives of the joints alone."""
 
     wind_up: Array
-    """(..., 3) displacement of the tip in frame 1 [m], by the gearboxes' wind-up under the torques."""
+    """(..., 3) displacement of the tip in frame 1 by the wind-up of the gearboxes [m]."""
     backlash: Array
-    """(...) the most that backlash may move the tip [m]."""
+    """(...) largest displacement of the tip by backlash [m]."""
     hysteresis: Array
-    """(...) the most that the gearboxes' hysteresis may move the tip [m]."""
+    """(...) largest displacement of the tip by the hysteresis of the gearboxes [m]."""
     step: Array
-    """(...) the most that the motors' microstep error may move the tip [m]."""
+    """(...) largest displacement of the tip by the microstep error of the motors [m]."""
     uncounted: tuple[str, ...]
-    """What is left out for want of data, a phrase each."""
+    """What is left out because data is missing, one phrase each."""
 
     @property
     def total(self) -> Array:
-        """(...) the most that all of it can come to [m]: the parts' sizes added up."""
+        """(...) largest total displacement [m]: the sum of the magnitudes of all parts."""
         size: Array = np.linalg.norm(self.wind_up, axis=-1)
         return size + self.backlash + self.hysteresis + self.step
 
 
 def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
-    """The tip's displacement under joint torques (..., 5) [Nm], to first order: d = J_v dq.
+    """Return the displacement of the tip under joint torques (..., 5) [Nm].
 
-    A gearbox yields to the load that its torque holds: dq_i = -wind_up(tau_i). Backlash, hysteresis and microstep error are
-    widths whose signs nobody knows: each is the worst over all signs of |sum_i +-J_v,i b_i|.
+    It is d = J_v dq, to first order. A gearbox yields to the load that its torque balances: dq_i =
+    -wind_up(tau_i). Backlash, hysteresis and microstep error are widths of unknown sign: each
+    displacement is the largest |sum_i +-J_v,i b_i| over all signs.
 
     Raises:
         InputError: q or tau is not finite or not (..., 5), or they do not broadcast.
@@ -84,24 +86,25 @@ def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
 
 
 def gear_stiffness(drives: tuple[Drive | None, ...]) -> tuple[Array, Mask]:
-    """Stiffness K1 of each joint's gearbox (5,) [Nm/rad], and which of them are known."""
+    """Return the stiffness K1 of each joint's gearbox (5,) [Nm/rad], and which are known."""
     stiffness = [None if d is None or d.gearbox.torsion_stiffness is None else d.gearbox.torsion_stiffness[0] for d in drives]
     return np.array([k or 0.0 for k in stiffness]), np.array([k is not None for k in stiffness])
 
 
 def gear_frequencies(boom: Boom, M: Array) -> Array | None:
-    """Natural frequencies (..., k) [Hz], ascending, of the arm on its k gearboxes' first stiffness, other joints locked.
+    """Return the natural frequencies (..., k) [Hz] of the arm on its k elastic gearboxes.
 
-        det(K - (2 pi f)^2 M) = 0,  M (..., 5, 5) from `mass_matrix`.
+        det(K - (2 pi f)^2 M) = 0,  M (..., 5, 5) from `mass_matrix`
 
-    None where no gearbox prints its stiffness.
+    K holds the first stiffness of the gearboxes. The frequencies ascend. The other joints are
+    locked. Return None if no gearbox has a printed stiffness.
     """
     stiffness, known = gear_stiffness(boom.drives)
     if not known.any():
         return None
     root = 1.0 / np.sqrt(stiffness[known])
     inverse = np.linalg.eigvalsh(root[:, None] * M[..., known, :][..., :, known] * root)
-    with np.errstate(divide="ignore"):  # a massless arm does not swing
+    with np.errstate(divide="ignore"):  # a massless arm has infinite frequencies
         frequencies: Array = 1.0 / (2.0 * np.pi * np.sqrt(np.maximum(inverse[..., ::-1], 0.0)))
     return frequencies
 
@@ -111,7 +114,10 @@ def _step_error(drive: Drive) -> float | None:
 
 
 def _worst(J: Array, widths: Array) -> Array:
-    """max over signs of |sum_i +-J_i w_i| (...), J (..., 3, 5); the first sign is free."""
+    """Return the largest |sum_i +-J_i w_i| (...) over all signs, for J (..., 3, 5).
+
+    The first sign can be fixed, because the magnitude does not depend on a common sign.
+    """
     moves = [J[..., i] * widths[i] for i in np.flatnonzero(widths)]
     if not moves:
         return np.zeros(J.shape[:-2])

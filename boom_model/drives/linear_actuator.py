@@ -1,4 +1,4 @@
-"""The linear actuator as a kind of drive: what the sheet of the extension's would say, and what a force asks of its screw."""
+"""Linear actuator as the drive of the extension: its datasheet values and its screw torque."""
 
 from dataclasses import dataclass
 
@@ -11,47 +11,50 @@ from boom_model.provenance import Sourced
 
 @dataclass(frozen=True)
 class LinearActuator:
-    """A screw and its nut, with whatever turns it. None stands for what the datasheet does not print."""
+    """A screw with its nut and its motor.
+
+    None stands for a value that the datasheet does not print.
+    """
 
     name: str
     source: str
     rated_force: float | None
-    """Mean force over the travel that its life is given for [N]."""
+    """Mean force over the travel of its rated life [N]."""
     peak_force: float | None
     """Largest force while it moves [N]."""
     static_force: float | None
-    """Largest force while it stands [N]."""
+    """Largest force at rest [N]."""
     max_speed: float | None
     """[m/s]"""
     stroke: float | None
     """[m]"""
     lead: float | None
-    """Travel in a turn of the screw [m]."""
+    """Travel per turn of the screw [m]."""
     efficiency: float | None
-    """Share of the screw's power that becomes force times speed, 0 to 1."""
+    """Output power (force times speed) over screw power, 0 to 1."""
     backdrive_force: float | None
-    """Force that starts to drive it back without power [N]."""
+    """Force at which it moves back without power [N]."""
     duty: float | None
-    """Share of the time that it may move, 0 to 1."""
+    """Fraction of the time in which it may move, 0 to 1."""
     mass: float | None
 
 
 @dataclass(frozen=True)
 class LinearDrive:
-    """A linear actuator as it is fitted."""
+    """A linear actuator as fitted to the boom."""
 
     actuator: LinearActuator
     brake: Sourced[bool] | None = None
-    """Whether a brake holds it without power; None where nobody says."""
+    """Whether a brake holds it without power; None if unknown."""
 
 
 def screw_torque(actuator: LinearActuator, force: ArrayLike, speed: ArrayLike) -> Array | None:
-    """Torque at the screw [Nm], signed like the force; shape of force [N] and speed [m/s], which broadcast.
+    """Return the torque at the screw [Nm] for a force [N] and a speed [m/s], which broadcast.
 
         driving (F v > 0):   F l / (2 pi eta)
-        braking or holding:  F l / (2 pi),  no credit for friction
+        braking or holding:  F l / (2 pi),  without credit for friction
 
-    None without lead or efficiency.
+    The torque has the sign of the force. Return None without lead or efficiency.
     """
     if actuator.lead is None or actuator.efficiency is None:
         return None

@@ -1,4 +1,4 @@
-"""Tip pose and Jacobian in closed form, and the motion of every frame and body by recursion.
+"""Tip pose and Jacobian in closed form; motion of every frame and body by recursion.
 
 With rho = L7 + theta4 and phi = theta3 + theta5, in the arm's vertical plane (r forward, z up):
 
@@ -20,20 +20,24 @@ from boom_model.kinematics.frames import BODY_FRAMES, SLIDING_ROW, THETA_RATES, 
 
 @dataclass(frozen=True)
 class TipPose:
-    """Where the tip is and how it points, in frame 1."""
+    """Position and orientation of the tip in frame 1."""
 
     position: Array
     """(..., 3) [m]"""
     rotation: Array
     """(..., 3, 3): R_1_11, thesis eq. 2.18 with entry (1, 3) corrected to +sin(theta1)."""
     pitch: Array
-    """(...) elevation of the end effector above the boom's forward horizontal [rad], in (-pi, pi]: down is -pi/2."""
+    """(...) elevation of the end effector above the boom's forward horizontal [rad].
+
+    It is in (-pi, pi]; -pi/2 faces down.
+    """
 
 
 def forward_kinematics(boom: Boom, q: ArrayLike) -> TipPose:
-    """Tip pose in closed form (thesis, eqs. 2.18 and 2.19).
+    """Return the tip pose in closed form (thesis, eqs. 2.18 and 2.19).
 
     Args:
+        boom: the boom.
         q: (..., 5) joint positions [rad, the extension in m].
 
     Raises:
@@ -61,10 +65,11 @@ def forward_kinematics(boom: Boom, q: ArrayLike) -> TipPose:
 
 
 def jacobian(boom: Boom, q: ArrayLike) -> Array:
-    """Geometric Jacobian of the tip in frame 1, shape (..., 6, 5): [v; omega] = J qd.
+    """Return the geometric Jacobian of the tip in frame 1, (..., 6, 5): [v; omega] = J qd.
 
-    Rows are velocity [m/s] over angular velocity [rad/s]; the inner link does not turn the tip, because the parallelogram
-    keeps the actuator's direction. Differentiates thesis eq. 2.19.
+    The upper rows give velocity [m/s], the lower ones angular velocity [rad/s]. The inner link does
+    not rotate the tip, because the parallelogram keeps the actuator's direction. Derived from
+    thesis eq. 2.19.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -89,7 +94,9 @@ def jacobian(boom: Boom, q: ArrayLike) -> Array:
 
 
 def jacobian_rate(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
-    """Time derivative of `jacobian`, (..., 6, 5): the tip's acceleration is J qdd + dJ/dt qd.
+    """Return the time derivative of `jacobian`, (..., 6, 5).
+
+    The acceleration of the tip is J qdd + dJ/dt qd.
 
     Raises:
         InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
@@ -102,7 +109,7 @@ def jacobian_rate(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
     c2, s2 = np.cos(q[..., 1]), np.sin(q[..., 1])
     c3, s3 = np.cos(q[..., 2]), np.sin(q[..., 2])
     ct, st = np.cos(q[..., 2] + q[..., 4]), np.sin(q[..., 2] + q[..., 4])
-    # Each column in the arm's plane, (r, z), and how it changes there; the yaw turns it besides.
+    # Each column in the arm's plane, (r, z), and its rate there; the yaw rotates it in addition.
     r, _ = _tip_in_plane(boom, q)
     across = (-g.L9 * s2, rho * s3 + g.L6 * c3 - g.L8 * ct, -c3, -g.L8 * ct)
     r_rates = (-g.L9 * c2 * v2, v4 * s3 + (rho * c3 - g.L6 * s3) * v3 + g.L8 * st * vt, s3 * v3, g.L8 * st * vt)
@@ -117,9 +124,10 @@ def jacobian_rate(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
 
 
 def manipulability(boom: Boom, q: ArrayLike) -> Array:
-    """Yoshikawa's measure of the tip's translation, sqrt(det(J_v J_v^T)), shape (...); 0 where a direction is lost.
+    """Return Yoshikawa's manipulability of the tip's translation, (...): sqrt(det(J_v J_v^T)).
 
-    Its rows are in m per rad, and m per m for the extension: compare it between poses, not between arms.
+    It is 0 at a singularity. Its columns have the units m/rad, and m/m for the extension, so
+    compare it between poses, not between arms.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -130,7 +138,9 @@ def manipulability(boom: Boom, q: ArrayLike) -> Array:
 
 
 def transmission_angle(q: ArrayLike) -> Array:
-    """Acute angle (...) between the inner and the lower link [rad]; the parallelogram is flat at 0, square at pi/2.
+    """Return the acute angle (...) between the inner and the lower link [rad].
+
+    The parallelogram is flat at 0 and rectangular at pi/2.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -142,7 +152,10 @@ def transmission_angle(q: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class FrameMotion:
-    """Motion of every frame of a loop over the ground, along the axes of frame 1; entry i - 1 is frame i."""
+    """Motion of every frame of a loop relative to the ground, along the axes of frame 1.
+
+    Entry i - 1 belongs to frame i.
+    """
 
     T: Array
     """(..., 11, 4, 4): T_1_i."""
@@ -151,30 +164,38 @@ class FrameMotion:
     angular_velocity: Array
     """(..., 11, 3) [rad/s]"""
     acceleration: Array
-    """(..., 11, 3) of the origin [m/s^2], gravity not counted"""
+    """(..., 11, 3) of the origin [m/s^2], without gravity"""
     angular_acceleration: Array
     """(..., 11, 3) [rad/s^2]"""
 
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """Motion of a body over the ground, along the axes of frame 1, each (..., 3) but for its pose."""
+    """Motion of a body relative to the ground, along the axes of frame 1.
+
+    Each field is (..., 3), except T.
+    """
 
     T: Array
     """(..., 4, 4): T_1_body."""
     com: Array
+    """position of the centre of mass [m]"""
     velocity: Array
-    """of the centre of mass"""
+    """of the centre of mass [m/s]"""
     angular_velocity: Array
+    """[rad/s]"""
     acceleration: Array
-    """of the centre of mass, gravity not counted"""
+    """of the centre of mass [m/s^2], without gravity"""
     angular_acceleration: Array
+    """[rad/s^2]"""
 
 
 def frame_motion(
     boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, loop: Loop, base: BaseMotion | None = None
 ) -> FrameMotion:
-    """Outward recursion over one loop (thesis, eqs. 2.39-2.43 as corrected), along the axes of frame 1.
+    """Return the motion of the frames of one loop by outward recursion, along the axes of frame 1.
+
+    The equations are the thesis's 2.39-2.43, as corrected.
 
     Raises:
         InputError: an input is not finite or of the wrong shape, or shapes do not match.
@@ -207,7 +228,9 @@ def frame_motion(
 def body_motion(
     boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, base: BaseMotion | None = None
 ) -> dict[str, BodyMotion]:
-    """Motion of every body and its centre of mass (thesis, eq. 2.44), by name; the payload's is that of frame 11.
+    """Return the motion of every body and its centre of mass by name (thesis, eq. 2.44).
+
+    The payload moves with frame 11.
 
     Raises:
         InputError: an input is not finite or of the wrong shape, or shapes do not match.

@@ -1,8 +1,8 @@
-"""The two Denavit-Hartenberg loops of the thesis, and the frame that each body is described in.
+"""The two Denavit-Hartenberg loops of the thesis, and the frame of each body.
 
-Frame 1 is the base, frame 11 the tip; row i of a table takes frame i to frame i+1 (thesis, tables 2-1 and 2-2 with the
-corrections of rows 8 and 6). Transforms are named T_parent_child: a point's coordinates in the parent are T @ those in
-the child.
+Frame 1 is the base, frame 11 the tip. Row i of a table takes frame i to frame i+1 (thesis, tables
+2-1 and 2-2 with the corrections of rows 8 and 6). Transforms are named T_parent_child: T multiplies
+the coordinates of a point in the child and gives those in the parent.
 """
 
 from typing import Any, Literal
@@ -16,7 +16,7 @@ from boom_model.boom import Boom
 Loop = Literal["inner", "outer"]
 
 _CHUNK = 1024
-"""States at once, whose working arrays stay in the processor's cache."""
+"""Number of states computed at a time, so that the working arrays fit the processor's cache."""
 
 BODY_FRAMES: dict[str, tuple[Loop, int]] = {
     "base": ("outer", 2),
@@ -27,7 +27,10 @@ BODY_FRAMES: dict[str, tuple[Loop, int]] = {
     "extension": ("outer", 9),
     "end_effector": ("outer", 10),
 }
-"""The loop and the frame in which each body's centre of mass and inertia are given; the payload's is frame 11, the tip."""
+"""Loop and frame in which the centre of mass and the inertia of each body are given.
+
+Those of the payload are given in frame 11, the tip.
+"""
 
 R_LINK_BODY = {
     "base": read_only([[1, 0, 0], [0, 0, 1], [0, -1, 0]]),
@@ -39,9 +42,12 @@ R_LINK_BODY = {
     "end_effector": read_only([[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
     "payload": read_only([[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
 }
-"""Rotation from a body's DH frame to its link axes (e, p, n): e at the link's angle from the arm's forward horizontal, p a
-quarter turn on, n the arm plane's normal. The link's angle is 0 for the base, theta2 for inner and outer, theta3 for lower,
-upper and extension, theta3 + theta5 for end effector and payload."""
+"""Rotation from a body's DH frame to its link axes (e, p, n).
+
+e points at the link's angle from the arm's forward horizontal, p a quarter turn further, and n is
+the normal of the arm's plane. The link's angle is 0 for the base, theta2 for inner and outer,
+theta3 for lower, upper and extension, and theta3 + theta5 for end effector and payload.
+"""
 
 THETA_RATES = {
     "inner": read_only(
@@ -54,17 +60,18 @@ THETA_RATES = {
         ]
     ),
 }
-"""How fast the theta_i of each row turns with the joints: d(theta_i)/dt = THETA_RATES[loop][i] @ qd, (10, 5)."""
+"""Rates of the angles theta_i of all rows (10, 5): d(theta_i)/dt = THETA_RATES[loop][i] @ qd."""
 
 SLIDING_ROW = 7
-"""Index of the row whose d_i is the extension's: d(d_i)/dt = qd[3]."""
+"""Index of the row whose d_i belongs to the extension: d(d_i)/dt = qd[3]."""
 
 
 def dh_rows(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
-    """Rows (alpha_{i-1}, a_{i-1}, d_i, theta_i) of one loop, shape (..., 10, 4), in rad and m.
+    """Return the rows (alpha_{i-1}, a_{i-1}, d_i, theta_i) of one loop, (..., 10, 4), in rad and m.
 
     Args:
-        q: (..., 5) joint positions.
+        boom: the boom.
+        q: (..., 5) joint positions [rad, m].
         loop: "inner" (thesis, table 2-1) or "outer" (table 2-2).
 
     Raises:
@@ -93,7 +100,9 @@ def dh_rows(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
 
 
 def frame_transforms(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
-    """T_1_i of every frame of one loop, shape (..., 11, 4, 4): entry [..., i-1, :, :] is T_1_i (thesis, eqs. 2.2 and 2.17).
+    """Return T_1_i of every frame of one loop, (..., 11, 4, 4) (thesis, eqs. 2.2 and 2.17).
+
+    The entry [..., i-1, :, :] is T_1_i.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -111,7 +120,7 @@ def frame_transforms(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
 
 
 def _steps(rows: Array) -> Array:
-    """T_i_i+1 of DH rows (n, 10, 4), (n, 10, 4, 4)."""
+    """Return T_i_i+1 (n, 10, 4, 4) of DH rows (n, 10, 4)."""
     alpha, a, d, theta = np.moveaxis(rows, -1, 0)
     ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(theta), np.sin(theta)
     steps = np.zeros((*theta.shape, 4, 4))
@@ -123,7 +132,7 @@ def _steps(rows: Array) -> Array:
 
 
 def body_transforms(boom: Boom, q: ArrayLike) -> dict[str, Array]:
-    """T_1_body of every body of `BODY_FRAMES`, and of the tip (frame 11), each (..., 4, 4)."""
+    """Return T_1_body (..., 4, 4) of every body of `BODY_FRAMES` and of the tip (frame 11)."""
     loops = {loop: frame_transforms(boom, q, loop) for loop in ("inner", "outer")}
     poses = {name: loops[loop][..., frame - 1, :, :] for name, (loop, frame) in BODY_FRAMES.items()}
     return poses | {"tip": loops["outer"][..., 10, :, :]}

@@ -1,4 +1,4 @@
-"""What the tip can reach: the nearest point to a target, and a map of a whole vertical plane."""
+"""Reach of the tip: the reachable point nearest to a target, and a map of a vertical plane."""
 
 from dataclasses import dataclass
 
@@ -20,21 +20,24 @@ _MOST_CELLS = 400  # along one side of a default grid
 
 @dataclass(frozen=True, eq=False)
 class NearestReachable:
-    """The reachable point nearest to a target on the line through the target and the base (the origin of frame 1)."""
+    """The reachable point nearest to a target on the line through the target and the base.
+
+    The base is the origin of frame 1.
+    """
 
     position: Array
     """(3,) [m]"""
     distance: float
-    """from the target [m]"""
+    """distance from the target [m]"""
     within_limits: bool
-    """False where no point of the line is reachable within the limits: then the geometry alone allows this one."""
+    """False if no point of the line is reachable within the limits; this one then violates them."""
 
 
 def nearest_reachable(boom: Boom, position: ArrayLike, pitch: float, hold: Hold) -> NearestReachable | None:
-    """The reachable point nearest to `position` on its line to the base; None where the line has none.
+    """Return the reachable point nearest to `position` on its line to the base, or None.
 
-    The line is scanned in steps of about a millimetre and the boundary found by bisection, so a reachable stretch
-    shorter than a step can be missed.
+    The line is scanned in steps of about a millimetre, and the boundary is found by bisection. A
+    reachable interval shorter than a step can be missed.
 
     Raises:
         InputError: position is not finite or not (3,).
@@ -63,7 +66,7 @@ def nearest_reachable(boom: Boom, position: ArrayLike, pitch: float, hold: Hold)
 
 
 def _boundary(boom: Boom, position: Array, pitch: float, hold: Hold, inside: float, within: bool) -> float:
-    """The share nearest to 1 that is still reachable, between a reachable share and the target."""
+    """Return the share nearest to 1 that is reachable, between a reachable share and the target."""
     outside = 1.0
     for _ in range(_BISECTIONS):
         middle = (inside + outside) / 2.0
@@ -75,44 +78,58 @@ def _boundary(boom: Boom, position: Array, pitch: float, hold: Hold, inside: flo
 
 @dataclass(frozen=True, eq=False)
 class ReachMap:
-    """What the tip reaches in the vertical plane y = 0 of frame 1, cell by cell, and with what torque to spare."""
+    """Reach of the tip in the vertical plane y = 0 of frame 1 with torque margins, cell by cell."""
 
     hold: Hold
     pitch: float
     """[rad]"""
     r: Array
-    """(n,) x in frame 1 of the cells' middles, rising [m]; negative behind the base."""
+    """(n,) x in frame 1 of the middles of the cells, ascending [m]; negative behind the base."""
     z: Array
-    """(m,) their heights in frame 1, rising [m]."""
+    """(m,) heights of the middles of the cells in frame 1, ascending [m]."""
     exists: Mask
-    """(m, n) A branch exists. A choice hold knows only branches within the limits: there it is `within_limits`."""
-    within_limits: Mask
-    """(m, n) A branch within the limits exists."""
-    q: Array
-    """(m, n, 5) The best branch within the limits, NaN where there is none: under a choice hold that of least cost, else the
-    one nearest to the middle of the joints' ranges, as in `inverse_kinematics`."""
-    torque_margin: Array
-    """(m, n) At q, at rest on level ground: 1 - the largest |static torque| / (what the drive allows at rest).
+    """(m, n) True where a branch exists.
 
-    Joints without a drive do not count, because nobody knows what they bear. Negative above a drive's limit, NaN where q is,
-    and everywhere if no joint has a drive."""
+    A constraint that chooses among branches finds only those within the limits; `exists` then
+    equals `within_limits`.
+    """
+    within_limits: Mask
+    """(m, n) True where a branch within the limits exists."""
+    q: Array
+    """(m, n, 5) best branch within the limits; NaN where there is none.
+
+    Under a constraint that chooses among branches it is the one of least cost; otherwise it is the
+    one nearest to the middle of the joint ranges, as in `inverse_kinematics`.
+    """
+    torque_margin: Array
+    """(m, n) 1 - the largest |static torque| / (limit of the drive at rest), at q on level ground.
+
+    Joints without a drive do not count, because their limit is unknown. The margin is negative
+    above a drive's limit. It is NaN where q is, and everywhere if no joint has a drive.
+    """
 
 
 def reach_map(
     boom: Boom, hold: Hold, pitch: float = -np.pi / 2.0, r: ArrayLike | None = None, z: ArrayLike | None = None
 ) -> ReachMap:
-    """The reach of the arm's vertical plane for one hold and pitch: tip at (r, 0, z) of frame 1, at every cell.
+    """Map the reach in the arm's vertical plane for one constraint and pitch.
 
-    The arm stands forward or turned round, as the yaw's limits allow. Collision with the ground, the vehicle or the boom
-    itself is not considered.
+    The tip is at (r, 0, z) of frame 1 in each cell. The arm stands forward or turned by 180
+    degrees, as the limits of the yaw allow. Collisions with the ground, the vehicle or the boom
+    itself are not checked.
 
     Args:
-        pitch: elevation of the end effector above the boom's own forward horizontal [rad]; -pi/2 faces down.
-        r: (n,) rising [m]; None is all that any hold reaches within the limits, in cells of 2 cm, coarser on a huge boom.
+        boom: the boom.
+        hold: the constraint that determines the redundant joint.
+        pitch: elevation of the end effector above the boom's own forward horizontal [rad]; -pi/2
+            faces down.
+        r: (n,) ascending [m]. None covers all that any constraint reaches within the limits, in
+            cells of 2 cm, or coarser for a very large boom.
         z: (m,) likewise.
 
     Raises:
-        InputError: pitch, r or z is not finite, r or z is not a rising row of numbers, or hold is none.
+        InputError: pitch, r or z is not finite, r or z is not an ascending vector, or hold is not a
+            constraint.
     """
     pitch = scalar("pitch", pitch)
     r, z = (
@@ -137,12 +154,15 @@ def reach_map(
 def _rising(name: str, values: ArrayLike) -> Array:
     grid = checked(name, values)
     if grid.ndim != 1 or grid.size == 0 or not (np.diff(grid) > 0.0).all():
-        raise InputError(f"{name} of shape {grid.shape} must be a row of rising numbers")
+        raise InputError(f"{name} of shape {grid.shape} must be a vector of ascending numbers")
     return grid
 
 
 def _default_grid(boom: Boom, pitch: float) -> tuple[Array, Array]:
-    """A box around every tip position within the limits, forward or turned round, and a cell more; 0 is among r and z."""
+    """Return a grid around every tip position within the limits, with one more cell on each side.
+
+    The arm may stand forward or turned by 180 degrees. 0 is among r and z.
+    """
     g, low, high = boom.geometry, boom.limits.lower, boom.limits.upper
     theta2, theta3 = (np.linspace(low[i], high[i], 721) for i in (1, 2))
     rho = g.L7 + np.array([low[3], high[3]])[:, None]

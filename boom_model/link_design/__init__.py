@@ -1,4 +1,9 @@
-"""Chapter 3 of the thesis: the shape of a link that has the least mass within stress, deflection and buckling."""
+"""Shape of a link of least mass within limits of stress, deflection and buckling.
+
+This is the link design of the thesis, chapter 3. The package holds the beam model with its
+stresses, deflections and buckling loads, the exact and the thesis's design methods, and finite
+elements to check a design.
+"""
 
 from boom_model.link_design.beam import Beam, Forces, LoadCases, deflection, internal_forces, mass, stress_height, von_mises
 from boom_model.link_design.buckling import critical_load, euler_load

@@ -1,14 +1,17 @@
-"""A link as a tapered beam of rectangular sections: internal forces, von Mises stress, deflection.
+"""A link as a tapered beam with rectangular sections: forces, von Mises stress and deflection.
 
-Axes of the link: x from its root (A, frame 5 of the inner link) to its end (B, frame 8), y across it in the arm's plane.
-Heights H (n + 1,) stand at stations x_i = i L / n and run linearly between them; the width w is that of all plates together.
-With the load f, m at the end and the body force -rho w H a(x) of the link's own motion and weight (thesis, eqs. 3.4-3.10):
+Axes of the link: x points from its root (A, frame 5 of the inner link) to its end (B, frame 8); y
+is across the link in the plane of the arm. The heights H (n + 1,) are given at the stations x_i = i
+L / n and are linear between them. The width w is that of all plates together. With the load f, m at
+the end and the body force -rho w H a(x) from the link's own motion and weight (thesis, eqs.
+3.4-3.10):
 
     N(x) = f_x - int_x^L rho w H a_x,   V(x) = f_y - int_x^L rho w H a_y,
     M(x) = m + f_y (L - x) - int_x^L rho w H a_y (xi - x) dxi
 
-a is the acceleration less gravity; a station carries the mass between the middles of its slices. Rotary inertia of the sections
-(rho I alpha) is left out, as Euler-Bernoulli's theory does: 1e-5 of the moment in the thesis's case.
+a is the acceleration minus gravity. The mass between the middles of its neighbouring slices is
+lumped at each station. The rotary inertia of the sections (rho I alpha) is neglected, as in
+Euler-Bernoulli theory; it is 1e-5 of the moment in the thesis's case.
 """
 
 from dataclasses import dataclass
@@ -26,18 +29,24 @@ Support = Literal["cantilever", "pinned"]
 
 @dataclass(frozen=True)
 class Beam:
-    """What of a link does not change while its heights are chosen."""
+    """The properties of a link that do not change while its heights are chosen."""
 
     length: float
-    """Between the pins [m]."""
+    """Distance between the pins [m]."""
     width: float
-    """Of all plates together [m]."""
+    """Width of all plates together [m]."""
     material: Material
     slices: int = 1000
     plates: int = 2
-    """Loose side by side: they share the load in the arm's plane, and buckle out of it one by one."""
+    """Number of plates, side by side and not connected.
+
+    They share the load in the plane of the arm, and buckle out of it separately.
+    """
     support: Support = "cantilever"
-    """"cantilever" is held at its root, and its end deflects; "pinned" is a strut between two pins, and its middle does."""
+    """"cantilever" is clamped at its root, and its end deflects.
+
+    "pinned" is a strut between two pins, and its middle deflects.
+    """
 
     def __post_init__(self) -> None:
         for name, value in (("length", self.length), ("width", self.width)):
@@ -51,23 +60,27 @@ class Beam:
 
     @property
     def stations(self) -> Array:
-        """x (n + 1,) [m]."""
+        """Positions x (n + 1,) [m]."""
         return np.linspace(0.0, self.length, self.slices + 1)
 
     @property
     def step(self) -> float:
+        """Length of a slice [m]."""
         return self.length / self.slices
 
     @property
     def weights(self) -> Array:
-        """Length (n + 1,) [m] that each station stands for: the trapezoid rule's."""
+        """Length (n + 1,) [m] that each station stands for, by the trapezoid rule."""
         weights = np.full(self.slices + 1, self.step)
         weights[[0, -1]] *= 0.5
         return weights
 
     @property
     def lever(self) -> Array:
-        """Moment (n + 1,) [m] of a unit force where the deflection counts: at a cantilever's end, at a strut's middle."""
+        """Moment (n + 1,) [m] of a unit force at the cantilever's end or at the strut's middle.
+
+        That is the point whose deflection is computed.
+        """
         x = self.stations
         return self.length - x if self.support == "cantilever" else np.minimum(x, self.length - x) / 2.0
 
@@ -75,30 +88,33 @@ class Beam:
 MOST_SLICES = 100_000
 
 SHEAR_FACTOR = 5.0 / 6.0
-"""Of a rectangle, in Timoshenko's theory."""
+"""Shear factor of a rectangle in Timoshenko's theory."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoadCases:
-    """What a link bears at each of k instants, along its own axes."""
+    """Loads on a link at k instants, along its own axes."""
 
     end_force: Array
-    """(k, 2) on the link at its end [N], x along it, y across."""
+    """(k, 2) force on the link at its end [N], along x and y."""
     end_moment: Array
-    """(k,) on the link at its end [Nm]."""
+    """(k,) moment on the link at its end [Nm]."""
     acceleration: Array
-    """(k, 2, 2) a_x and a_y as polynomials of x, constant first: acceleration less gravity [m/s^2, 1/s^2]."""
+    """(k, 2, 2) a_x and a_y as polynomials of x, constant term first [m/s^2, 1/s^2].
+
+    They are accelerations minus gravity.
+    """
     clamp: Array
-    """(k,) where the link is held, from its root [m]: 0, but for what telescopes."""
+    """(k,) distance from the root at which the link is clamped [m]; 0 unless it telescopes."""
 
     @staticmethod
     def of(
         end_force: ArrayLike, acceleration: ArrayLike, end_moment: ArrayLike | None = None, clamp: ArrayLike | None = None
     ) -> "LoadCases":
-        """Load cases from arrays of the shapes above, checked.
+        """Return load cases of checked arrays of the shapes above.
 
         Raises:
-            InputError: not finite, or shapes that do not match.
+            InputError: a value is not finite, or the shapes do not match.
         """
         force = checked("end force", end_force, 2)
         if force.ndim != 2 or not len(force):
@@ -113,10 +129,11 @@ class LoadCases:
 
     @property
     def count(self) -> int:
+        """Number of load cases k."""
         return len(self.end_force)
 
     def at(self, index: ArrayLike) -> "LoadCases":
-        """Some of the cases, by their numbers."""
+        """Return some of the cases, by their numbers."""
         pick = np.atleast_1d(np.asarray(index, dtype=int))
         return LoadCases(*(read_only(a[pick]) for a in (self.end_force, self.end_moment, self.acceleration, self.clamp)))
 
@@ -125,7 +142,7 @@ class Forces(NamedTuple):
     """Internal forces at the stations, (k, n + 1) each."""
 
     N: Array
-    """[N], tension positive"""
+    """[N], positive in tension"""
     V: Array
     """[N]"""
     M: Array
@@ -133,14 +150,16 @@ class Forces(NamedTuple):
 
 
 def body_acceleration(beam: Beam, cases: LoadCases) -> Array:
-    """a_x and a_y (k, 2, n + 1) at the stations [m/s^2]."""
+    """Return a_x and a_y (k, 2, n + 1) at the stations [m/s^2]."""
     a = cases.acceleration
     acceleration: Array = a[..., :1] + a[..., 1:] * beam.stations
     return acceleration
 
 
 def internal_forces(beam: Beam, H: ArrayLike, cases: LoadCases) -> Forces:
-    """Normal force, shear and bending moment of a beam of heights H (n + 1,) [m] under each load case.
+    """Return normal force, shear force and bending moment in each load case.
+
+    H (n + 1,) are the heights [m].
 
     Raises:
         InputError: H is not finite or has another shape.
@@ -153,14 +172,17 @@ def internal_forces(beam: Beam, H: ArrayLike, cases: LoadCases) -> Forces:
     N = cases.end_force[:, :1] + beyond[:, 0] + half[:, 0]
     V = cases.end_force[:, 1:] + beyond[:, 1] + half[:, 1]
     M = cases.end_moment[:, None] + cases.end_force[:, 1:] * (L - x) + beyond_each(lumps[:, 1] * x) - x * beyond[:, 1]
-    if beam.support == "pinned":  # the end's pin carries what keeps the root free of moment
+    if beam.support == "pinned":  # the pin at the end carries the force that makes the moment at the root zero
         V, M = V - M[:, :1] / L, M - M[:, :1] * (1.0 - x / L)
-    held = x < cases.clamp[:, None] - 1e-12
-    return Forces(*(np.where(held, 0.0, f) for f in (N, V, M)))
+    clamped = x < cases.clamp[:, None] - 1e-12
+    return Forces(*(np.where(clamped, 0.0, f) for f in (N, V, M)))
 
 
 def added_by_height(beam: Beam, cases: LoadCases, weights: Forces) -> Array:
-    """d/dH_j (n + 1,) of sum_i (weights.N N + weights.V V + weights.M M)_i over all cases, `internal_forces` in reverse."""
+    """Return d/dH_j (n + 1,) of sum_i (weights.N N + weights.V V + weights.M M)_i over all cases.
+
+    It is `internal_forces` in reverse.
+    """
     x, L = beam.stations, beam.length
     wN, wV, wM = (np.where(x < cases.clamp[:, None] - 1e-12, 0.0, w) for w in weights)
     from_moment = before_each(wM) * x - before_each(wM * x)
@@ -174,12 +196,17 @@ def added_by_height(beam: Beam, cases: LoadCases, weights: Forces) -> Array:
 
 
 def mass(beam: Beam, H: ArrayLike) -> float:
-    """rho w int H dx [kg] (thesis, eq. 3.1)."""
+    """Return the mass rho w int H dx [kg] (thesis, eq. 3.1)."""
     return float(beam.material.density * beam.width * (beam.weights @ _heights(beam, H)))
 
 
 def von_mises(beam: Beam, H: ArrayLike, forces: Forces) -> Array:
-    """sqrt((|N|/A + |M| H/2 / I)^2 + 3 (V/A)^2) (k, n + 1) [Pa], A = w H, I = w H^3/12 (Appendix D; eqs. 3.11-3.14)."""
+    """Return the von Mises stress (k, n + 1) [Pa] (Appendix D; eqs. 3.11-3.14).
+
+        sqrt((|N|/A + |M| H/2 / I)^2 + 3 (V/A)^2),  A = w H,  I = w H^3/12
+
+    H (n + 1,) are the heights [m].
+    """
     H = _heights(beam, H)
     area = beam.width * H
     normal = np.abs(forces.N) / area + 6.0 * np.abs(forces.M) / (area * H)
@@ -188,10 +215,10 @@ def von_mises(beam: Beam, H: ArrayLike, forces: Forces) -> Array:
 
 
 def stress_height(beam: Beam, forces: Forces, limit: float) -> Array:
-    """Least heights (k, n + 1) [m] at which `von_mises` is at most `limit` [Pa].
+    """Return the least heights (k, n + 1) [m] at which `von_mises` is at most `limit` [Pa].
 
-    The one positive root of (limit w)^2 H^4 = (|N| H + 6 |M|)^2 + 3 V^2 H^2, by Newton's method from above, where the
-    difference is convex.
+    Each is the single positive root of (limit w)^2 H^4 = (|N| H + 6 |M|)^2 + 3 V^2 H^2. Newton's
+    method finds it from above, where the difference is convex.
     """
     N, V, M = (np.abs(f) for f in forces)
     s = limit * beam.width
@@ -209,26 +236,39 @@ def stress_height(beam: Beam, forces: Forces, limit: float) -> Array:
 
 
 def deflection_coefficients(beam: Beam, M: Array) -> Array:
-    """c (k, n + 1) [m^4] of the deflection sum_i c_i / H_i^3, by moment area (thesis, eqs. 3.18-3.36): 12 |M| lever dx / (E w).
+    """Return c (k, n + 1) [m^4] of the deflection sum_i c_i / H_i^3.
 
-    The size of M stands there, as in Appendix D: where a moment changes its sign along the beam, the sum is an upper bound.
+        c = 12 |M| lever dx / (E w)
+
+    This is the moment-area method (thesis, eqs. 3.18-3.36). It uses |M|, as Appendix D
+    does: if the moment changes its sign along the beam, the sum is an upper bound.
     """
     c: Array = 12.0 * np.abs(M) * beam.lever * beam.weights / (beam.material.elastic_modulus * beam.width)
     return c
 
 
 def shear_coefficients(beam: Beam, V: Array) -> Array:
-    """d (k, n + 1) [m^2] of the deflection sum_i d_i / H_i that shear adds (Timoshenko): 1.2 |V| |dlever/dx| dx / (G w)."""
+    """Return d (k, n + 1) [m^2] of the deflection sum_i d_i / H_i caused by shear.
+
+        d = 1.2 |V| |dlever/dx| dx / (G w)
+
+    This is Timoshenko's theory.
+    """
     per_force = 1.0 if beam.support == "cantilever" else 0.5
     d: Array = np.abs(V) * per_force * beam.weights / (SHEAR_FACTOR * beam.material.shear_modulus * beam.width)
     return d
 
 
 def deflection(beam: Beam, H: ArrayLike, forces: Forces, *, shear: bool = False) -> Array:
-    """Deflection (k,) [m] of a cantilever's end or a strut's middle: see the coefficients above.
+    """Return the deflection (k,) [m] of a cantilever's end or a strut's middle.
+
+    See `deflection_coefficients` and `shear_coefficients`.
 
     Args:
-        shear: whether to count the sections' shear. The thesis does not.
+        beam: the beam.
+        H: (n + 1,) heights [m].
+        forces: its internal forces.
+        shear: whether to include the deflection by shear. The thesis does not.
     """
     H = _heights(beam, H)
     total: Array = (deflection_coefficients(beam, forces.M) / H**3).sum(axis=-1)
@@ -245,19 +285,19 @@ def _heights(beam: Beam, H: ArrayLike) -> Array:
 
 
 def outboard_share(beam: Beam) -> Array:
-    """How much of a station's own mass lies beyond it (n + 1,)."""
+    """Return the share of a station's own mass that lies beyond it (n + 1,)."""
     share = np.full(beam.slices + 1, 0.5)
     share[0], share[-1] = 1.0, 0.0
     return share
 
 
 def beyond_each(values: Array) -> Array:
-    """Sum over the stations beyond each, along the last axis."""
+    """Return the sum over the stations beyond each one, along the last axis."""
     total: Array = np.cumsum(values[..., ::-1], axis=-1)[..., ::-1] - values
     return total
 
 
 def before_each(values: Array) -> Array:
-    """Sum over the stations before each, along the last axis."""
+    """Return the sum over the stations before each one, along the last axis."""
     total: Array = np.cumsum(values, axis=-1) - values
     return total

@@ -1,12 +1,14 @@
-"""Column buckling of a link: the thesis's formula for a prism, and the tapered column by its eigenvalue.
+"""Column buckling of a link: the thesis's formula for a prism, and an eigenvalue for a taper.
 
-A column under the end load P and the axial load of its own body force holds until, for some deflection v(x) of its support,
+A column under the end load P and the axial load of its own body force is stable until, for some
+deflection v(x) that its supports allow,
 
     int E I v''^2 dx = int (P + n(x)) v'^2 dx,     n(x) = int_x^L rho w H a_x
 
-(Timoshenko and Gere, Theory of Elastic Stability, section 2.8). Out of the arm's plane I = t^2 w H / 12 for loose plates of
-thickness t = w / plates, which is linear in the heights, as n is: the critical load is a concave function of them, of the first
-degree, and its gradient bounds it from above everywhere. In the plane I = w H^3 / 12.
+(Timoshenko and Gere, Theory of Elastic Stability, section 2.8). Out of the plane of the arm, I =
+t^2 w H / 12 for separate plates of thickness t = w / plates. I is then linear in the heights, and
+so is n. The critical load is therefore a concave function of the heights, homogeneous of degree
+one, and its gradient gives an upper bound everywhere. In the plane of the arm, I = w H^3 / 12.
 """
 
 from typing import Literal, NamedTuple
@@ -23,11 +25,14 @@ THESIS_LENGTH_FACTOR = 0.7
 Plane = Literal["across", "in-plane"]
 
 _ELEMENTS = 60
-"""Hermite cubics: the critical load of a smooth column is then right to 1e-7, short of the rounding of finer meshes."""
+"""Number of cubic Hermite elements.
+
+The critical load of a smooth column is then accurate to 1e-7; finer meshes add rounding errors.
+"""
 
 
 def euler_load(elastic_modulus: float, second_moment: float, length: float, factor: float = THESIS_LENGTH_FACTOR) -> float:
-    """P_cr = pi^2 E I / (K L)^2 [N] of a prism (thesis, eq. 3.38)."""
+    """Return the Euler load P_cr = pi^2 E I / (K L)^2 [N] of a prism (thesis, eq. 3.38)."""
     return float(np.pi**2 * elastic_modulus * second_moment / (factor * length) ** 2)
 
 
@@ -35,31 +40,35 @@ _MODES = 16
 
 
 class Buckling(NamedTuple):
-    """A critical end load, and how the heights move it."""
+    """A critical end load and its derivatives by the heights."""
 
     load: float
-    """[N]; below 0 where the link does not even carry its own body force."""
+    """[N]; negative if the link cannot even carry its own body force."""
     gradient: Array
     """(n + 1,) d load / d H [N/m]"""
     curvature: Array
-    """(modes, n + 1): out of the plane d^2 load / dH^2 = -curvature^T curvature"""
+    """(modes, n + 1): out of the plane, d^2 load / dH^2 = -curvature^T curvature"""
 
 
 def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane = "across") -> Buckling:
-    """Critical end load of the tapered column under its own body force, by Hermite elements.
+    """Return the critical end load of the tapered column under its own body force.
 
-    Across the arm's plane a cantilever is held at its root and guided at its end, as the thesis's K = 0.7 has it, and a strut
-    is pinned at both; in the plane a cantilever's end is free.
+    It uses cubic Hermite elements. Across the plane of the arm, a cantilever is clamped at its root
+    and guided at its end, as the thesis's K = 0.7 implies, and a strut is pinned at both ends. In
+    the plane of the arm, the end of a cantilever is free.
 
     Args:
+        beam: the beam.
         H: (n + 1,) heights [m].
-        axial_acceleration: (2,) a_x as a polynomial of x, constant first [m/s^2, 1/s^2]; above 0 it presses together.
+        axial_acceleration: (2,) a_x as a polynomial of x, constant term first [m/s^2, 1/s^2]; a
+            positive value compresses the link.
+        plane: plane of the deflection.
     """
     from scipy.linalg import eigh
 
     n, dx = beam.slices, beam.step
     elements = min(n, _ELEMENTS)
-    ends = np.rint(np.linspace(0, n, elements + 1)).astype(int)  # whole slices, so that no station is favoured
+    ends = np.rint(np.linspace(0, n, elements + 1)).astype(int)  # whole slices, so that all stations are treated alike
     points, gauss = np.polynomial.legendre.leggauss(3)
     share = (points + 1.0) / 2.0
     element = np.repeat(np.arange(elements), np.diff(ends))[:, None]
@@ -70,12 +79,15 @@ def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane 
     weights = gauss / 2.0 * dx
 
     def at_points(values: Array) -> Array:
-        """(n + 1,) to (n, 3)."""
+        """Interpolate values (n + 1,) at the integration points (n, 3)."""
         interpolated: Array = values[:-1, None] * (1.0 - share) + values[1:, None] * share
         return interpolated
 
     def to_stations(values: Array) -> Array:
-        """The adjoint of `at_points`, with the weights of the integral: (..., n, 3) to (..., n + 1)."""
+        """Apply the adjoint of `at_points` with the weights of the integral.
+
+        The shapes are (..., n, 3) and (..., n + 1).
+        """
         total: Array = np.zeros((*values.shape[:-2], n + 1))
         total[..., :-1] += values @ (weights * (1.0 - share))
         total[..., 1:] += values @ (weights * share)
@@ -90,16 +102,16 @@ def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane 
     pressing = beam.material.density * w * beam.weights * (axial_acceleration[0] + axial_acceleration[1] * beam.stations)
     own = at_points(beyond_each(pressing * H) + outboard_share(beam) * pressing * H)
 
-    def assembled(shapes: Array, values: Array) -> Array:
+    def stiffness(shapes: Array, values: Array) -> Array:
         local = np.einsum("aki,bki,ki->kab", shapes, shapes, values * weights)
         return _assembled(np.add.reduceat(local, ends[:-1], axis=0), elements)[np.ix_(free, free)]
 
     free = _free(beam, elements, plane)
-    K = assembled(curvature, bending) - assembled(slope, own)
-    values, vectors = eigh(K, assembled(slope, np.ones((n, 3))))
+    K = stiffness(curvature, bending) - stiffness(slope, own)
+    values, vectors = eigh(K, stiffness(slope, np.ones((n, 3))))
     v = np.zeros((len(values), 2 * elements + 2))
     v[:, free] = vectors.T
-    local = v[:, 2 * element + np.arange(4)]  # (modes, n, 4), of unit int v'^2 dx
+    local = v[:, 2 * element + np.arange(4)]  # (modes, n, 4), scaled to int v'^2 dx = 1
     bent = np.einsum("mka,aki->mki", local, curvature)
     turned = np.einsum("mka,aki->mki", local, slope)
     weight = to_stations(turned[0] * turned)
@@ -109,7 +121,7 @@ def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane 
 
 
 def _free(beam: Beam, elements: int, plane: Plane) -> NDArray[np.intp]:
-    """Degrees of freedom (deflection and slope at each node) that the supports leave."""
+    """Return the degrees of freedom that the supports leave: deflection and slope at each node."""
     free = np.ones(2 * elements + 2, dtype=bool)
     free[0] = False
     if beam.support == "cantilever":
@@ -120,7 +132,7 @@ def _free(beam: Beam, elements: int, plane: Plane) -> NDArray[np.intp]:
 
 
 def _assembled(local: Array, elements: int) -> Array:
-    """Element matrices (e, 4, 4) into one (2 e + 2, 2 e + 2)."""
+    """Assemble element matrices (e, 4, 4) into one (2 e + 2, 2 e + 2)."""
     whole = np.zeros((2 * elements + 2,) * 2)
     at = 2 * np.arange(elements)[:, None] + np.arange(4)
     np.add.at(whole, (at[:, :, None], at[:, None, :]), local)

@@ -1,7 +1,8 @@
-"""A link by finite elements, to hold a design against: beams after Euler-Bernoulli and Timoshenko, and the contour as a plate.
+"""Finite elements that check a design: Euler-Bernoulli and Timoshenko beams, and a plate.
 
-Assembly and elements are scikit-fem's, and this file its only importer; of the design it takes the heights, the load case and
-the material, none of its formulas. The thesis's counterparts: ANSYS beam 188 (figure 3-18) and hexahedra (figure 3-20).
+Elements and assembly are scikit-fem's, and only this module imports it. Of the design it uses the
+heights, the load case and the material, but none of its formulas. The thesis's counterparts are
+ANSYS beam 188 (figure 3-18) and hexahedra (figure 3-20).
 """
 
 from dataclasses import dataclass
@@ -18,26 +19,30 @@ Theory = Literal["euler-bernoulli", "timoshenko"]
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """What the elements say of one load case."""
+    """Result of the finite elements for one load case."""
 
     deflection: float
-    """Of a cantilever's end or a strut's middle [m]"""
+    """Deflection of a cantilever's end or a strut's middle [m]"""
     x: Array
-    """Places of the stresses [m]"""
+    """Positions of the stresses [m]"""
     stress: Array
-    """Largest von Mises stress of the section there [Pa]"""
+    """Largest von Mises stress of the section at x [Pa]"""
     elements: int
 
 
 def solve_beam(
     beam: Beam, H: Array, case: LoadCases, elements: int, theory: Theory = "euler-bernoulli", *, prismatic: bool = False
 ) -> Solution:
-    """The link as beam elements.
+    """Solve the link as beam elements.
 
     Args:
+        beam: the beam.
         H: (n + 1,) heights [m], linear between the stations.
-        case: one load case, of a link held at its root.
-        prismatic: whether an element has the height of its middle all along, as those of the thesis's figure 3-18 have.
+        case: one load case of a link clamped at its root.
+        elements: number of elements.
+        theory: beam theory of the elements.
+        prismatic: whether each element has the height of its middle along its whole length, as in
+            the thesis's figure 3-18.
     """
     from scipy.sparse import bmat
     from skfem import (
@@ -52,7 +57,7 @@ def solve_beam(
         solve,
     )
 
-    _one(case)
+    _require_one(case)
     E, G, w = beam.material.elastic_modulus, beam.material.shear_modulus, beam.width
     mesh = MeshLine(np.linspace(0.0, beam.length, elements + 1))
 
@@ -74,7 +79,7 @@ def solve_beam(
     pull = LinearForm(lambda v, p: along(p.x[0]) * v).assemble(bar)
     pull[_at(bar, end)] += case.end_force[0, 0]
     u = solve(*condense(stretch, pull, D=_at(bar, np.zeros(1))))
-    held = np.zeros(1) if beam.support == "cantilever" else np.array([0.0, beam.length])
+    supports = np.zeros(1) if beam.support == "cantilever" else np.array([0.0, beam.length])
     watched = beam.length if beam.support == "cantilever" else beam.length / 2.0
     if theory == "euler-bernoulli":
         basis = Basis(mesh, ElementLineHermite(), intorder=order, disable_doflocs=True)
@@ -84,7 +89,7 @@ def solve_beam(
         last = int(np.argmax(mesh.p[0]))
         push[deflections[last]] += case.end_force[0, 1]
         push[slopes[last]] += case.end_moment[0]
-        fixed = [deflections[np.argmin(np.abs(mesh.p[0] - x))] for x in held]
+        fixed = [deflections[np.argmin(np.abs(mesh.p[0] - x))] for x in supports]
         if beam.support == "cantilever":
             fixed.append(slopes[np.argmin(mesh.p[0])])
         v = solve(*condense(bend, push, D=np.array(fixed)))
@@ -116,7 +121,7 @@ def solve_beam(
         push = np.concatenate([LinearForm(lambda v, p: across(p.x[0]) * v).assemble(lift), np.zeros(turn.N)])
         push[_at(lift, end)] += case.end_force[0, 1]
         push[lift.N + _at(turn, end)] += case.end_moment[0]
-        fixed = list(_at(lift, held))
+        fixed = list(_at(lift, supports))
         if beam.support == "cantilever":
             fixed += list(lift.N + _at(turn, np.zeros(1)))
         both = solve(*condense(K, push, D=np.array(fixed)))
@@ -134,16 +139,22 @@ def solve_beam(
 
 
 def solve_plate(beam: Beam, H: Array, case: LoadCases, along: int, across: int) -> Solution:
-    """The contour as a plate in plane stress, quadrilaterals of second degree, one thick as all plates together.
+    """Solve the contour as a plate in plane stress.
 
-    A cantilever is held all along its root. Its end carries the load spread over the section: the force evenly, the moment
-    linearly. Near both ends the stress is theirs, not a beam's.
+    The elements are quadrilaterals of second degree. Their thickness is that of all plates
+    together. A cantilever is clamped along its whole root. The load at its end is spread over the
+    section: the force evenly, the moment linearly. Near both ends the stress differs from that of a
+    beam.
 
     Args:
-        along, across: elements along the link and over its height.
+        beam: the beam.
+        H: (n + 1,) heights [m], linear between the stations.
+        case: one load case of a link clamped at its root.
+        along: number of elements along the link.
+        across: number of elements over its height.
 
     Raises:
-        InputError: a strut between pins, whose pins no plate's edge stands for.
+        InputError: the beam is a strut between pins, which no edge of a plate can represent.
     """
     from skfem import (
         Basis,
@@ -158,9 +169,9 @@ def solve_plate(beam: Beam, H: Array, case: LoadCases, along: int, across: int) 
     )
     from skfem.helpers import ddot, sym_grad, trace
 
-    _one(case)
+    _require_one(case)
     if beam.support != "cantilever":
-        raise InputError("the plate model is of a link held at its root")
+        raise InputError("the plate model needs a link clamped at its root, not a strut")
     E, nu, w = beam.material.elastic_modulus, beam.material.poisson_ratio, beam.width
     square = MeshQuad.init_tensor(np.linspace(0.0, beam.length, along + 1), np.linspace(-0.5, 0.5, across + 1))
     x, y = square.p
@@ -182,7 +193,7 @@ def solve_plate(beam: Beam, H: Array, case: LoadCases, along: int, across: int) 
     u = solve(*condense(BilinearForm(form).assemble(basis), load, D=basis.get_dofs("root")))
     ends = edge.interpolate(u)
     deflection = float((np.asarray(ends)[1] * edge.dx).sum() / edge.dx.sum())
-    # Stress at the outer edges, where a beam's is largest.
+    # Stress at the outer edges, where that of a beam is largest.
     outer = FacetBasis(mesh, element, facets=mesh.facets_satisfying(_outline(beam, H), boundaries_only=True), intorder=2)
     g = np.asarray(outer.interpolate(u).grad)
     exx, eyy, gxy = g[0, 0], g[1, 1], g[0, 1] + g[1, 0]
@@ -201,25 +212,25 @@ def _outline(beam: Beam, H: Array):  # type: ignore[no-untyped-def]
     return on
 
 
-def _one(case: LoadCases) -> None:
+def _require_one(case: LoadCases) -> None:
     if case.count != 1 or case.clamp[0] > 0.0:
-        raise InputError("the elements take one load case, of a link held at its root")
+        raise InputError("the finite elements need exactly one load case of a link clamped at its root")
 
 
 def _body(beam: Beam, case: LoadCases, axis: int, x: Array) -> Array:
-    """Body force of a link a metre high [N/m^2]."""
+    """Return the body force of a link of height 1 m [N/m^2]."""
     a = case.acceleration[0, axis]
     return np.asarray(-beam.material.density * beam.width * (a[0] + a[1] * x))
 
 
 def _at(basis: "object", x: Array) -> Array:
-    """The degrees of freedom of a line's basis at places x."""
+    """Return the degrees of freedom of a line's basis at positions x."""
     places = basis.doflocs[0]  # type: ignore[attr-defined]
     return np.array([int(np.argmin(np.abs(places - each))) for each in x])
 
 
 def _shear(beam: Beam, case: LoadCases, H: Array, points: Array) -> Array:
-    """Shear force by equilibrium, for Euler-Bernoulli's theory gives none of its own."""
+    """Return the shear force by equilibrium, because Euler-Bernoulli theory does not give it."""
     from scipy.integrate import cumulative_simpson
 
     x = np.linspace(0.0, beam.length, 4001)

@@ -1,4 +1,4 @@
-"""The boom's links as beams, and a designed beam as the body of a link again."""
+"""Links of the boom as beams, and a designed beam as the body of a link."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -22,34 +22,46 @@ from boom_model.toml_file import NonNegative, Positive, Table, read_toml
 LINKS_FILE = Path(str(files("boom_model") / "data" / "links.toml"))
 
 LINKS = ("inner", "lower", "outer", "extension")
-"""Links that can be designed. Each is held at its root, but for the outer one, a strut between two pins."""
+"""Links that can be designed.
+
+Each is clamped at its root, except the outer one, which is a strut between two pins.
+"""
 
 _TURNED = read_only(np.diag([-1.0, 1.0, -1.0]))
-"""From the link axes (e, p, n) to those of the extension's beam, whose end, the wrist, is where e comes from."""
+"""Rotation from the link axes (e, p, n) to those of the extension's beam, whose end is the wrist.
+
+The e axis of the extension points away from the wrist.
+"""
 
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """What a link is made of, and what of it stays as it is."""
+    """Construction of a link, including the parts that the design does not change."""
 
     name: str
     length: float
-    """Between its pins; of the extension what stands out at full stroke [m]"""
+    """Distance between its pins; for the extension, the free length at full stroke [m]"""
     support: Support
     width: float
-    """Of all plates [m]"""
+    """Width of all plates together [m]"""
     plates: int
     spacing: float
-    """Between the middles of the outermost plates [m]"""
+    """Distance between the middles of the outermost plates [m]"""
     designed: tuple[float, float]
-    """The part of its length whose contour is the design's; what lies beyond is of the fittings."""
+    """Part of the length whose contour is designed, as fractions.
+
+    The rest belongs to the fittings.
+    """
     origin: Origin
-    """Of the plates and their spacing"""
+    """Origin of the plates and their spacing"""
     fittings: Body | None
-    """Along the beam's axes, about its root; None where none are known"""
+    """Fittings along the axes of the beam, about its root; None if unknown"""
     fittings_origin: Origin | None
     cross_plates: int = 0
-    """Plates between the plates, evenly along the designed part, as thick as one and as high as the contour there"""
+    """Number of plates between the plates, evenly spaced along the designed part.
+
+    Each is as thick as one plate and as high as the contour at its position.
+    """
 
     def __post_init__(self) -> None:
         (first, last), thickness = self.designed, self.width / self.plates
@@ -59,7 +71,7 @@ class Link:
         if self.spacing < together * (1.0 - 1e-9):
             raise InputError(
                 f"{self.name} link: spacing is {self.spacing:g} m; {self.plates} plates of {thickness:g} m need at least "
-                f"{together:g} m between the outermost ones' middles"
+                f"{together:g} m between the middles of the outermost plates"
             )
         if self.cross_plates * thickness > (last - first) * self.length:
             raise InputError(
@@ -68,14 +80,18 @@ class Link:
             )
 
     def beam(self, material: Material, slices: int) -> Beam:
+        """Return the link as a beam."""
         return Beam(self.length, self.width, material, slices=slices, plates=self.plates, support=self.support)
 
 
 def load_link(boom: Boom, name: str, path: str | Path | None = None) -> Link:
-    """A link of a boom with the plates and fittings of a TOML file; None is the shipped `boom_model/data/links.toml`.
+    """Load a link of a boom, with the plates and fittings of a TOML file.
+
+    If path is None, load the shipped `boom_model/data/links.toml`.
 
     Raises:
-        InputError: there is no such link, the file cannot be read or breaks the form, or its plates do not fit; names the key.
+        InputError: unknown link, a file that cannot be read or has the wrong form, or plates that
+            do not fit. The message names the key.
     """
     file = LINKS_FILE if path is None else Path(path)
     table = read_toml(file, _LinksTable).links
@@ -102,9 +118,10 @@ def load_link(boom: Boom, name: str, path: str | Path | None = None) -> Link:
 
 
 def link_body(link: Link, beam: Beam, H: Array) -> Body:
-    """The whole link as a body in its frame: designed part of the plates, cross plates and fittings.
+    """Return the whole link as a body in its frame: plates, cross plates and fittings.
 
-    A plate's element is a bar as long as a slice, H high, a plate thick, half a spacing off the middle plane.
+    Only the designed part of the plates counts. A plate's element is a bar as long as a slice, of
+    height H, as thick as a plate, and half the spacing off the middle plane.
     """
     first, last = (round(share * beam.slices) for share in link.designed)
     dx, rho = beam.step, beam.material.density
@@ -127,7 +144,7 @@ def link_body(link: Link, beam: Beam, H: Array) -> Body:
     P = np.sum(parts, axis=0)
     mass, com = P[0, 0], P[0, 1:] / P[0, 0]
     second = P[1:, 1:] - mass * np.outer(com, com)
-    if link.name == "extension":  # its beam runs from its root to the wrist, where its frame stands
+    if link.name == "extension":  # its beam runs from its root to the wrist, where its frame is
         com = _TURNED @ (com - np.array([link.length, 0.0, 0.0]))
         second = _TURNED @ second @ _TURNED
     R = R_LINK_BODY[link.name].T
@@ -136,13 +153,13 @@ def link_body(link: Link, beam: Beam, H: Array) -> Body:
 
 
 def with_body(boom: Boom, name: str, body: Body) -> Boom:
-    """The boom with another body."""
+    """Return the boom with another body."""
     bodies: Mapping[str, Body] = {**boom.bodies, name: body}
     return replace(boom, bodies=bodies)
 
 
 def _moments(m: Any, x: Any, xx: Any, yy: Any, zz: Any) -> Array:
-    """int (1, r)(1, r)^T dm of bars at (x, 0, 0) with second moments of their own: (4, 4)."""
+    """Return int (1, r)(1, r)^T dm (4, 4) of bars at (x, 0, 0) with second moments of their own."""
     P = np.zeros((4, 4))
     P[0, 0] = m.sum()
     P[0, 1] = P[1, 0] = m @ x

@@ -1,4 +1,4 @@
-"""Materials of links: a TOML file in engineering units, read into SI."""
+"""Materials of links: a TOML file in engineering units, converted to SI."""
 
 from dataclasses import dataclass
 from importlib.resources import files
@@ -30,15 +30,18 @@ class Material:
 
     @property
     def shear_modulus(self) -> float:
-        """G = E / (2 (1 + nu)) [Pa]."""
+        """Shear modulus G = E / (2 (1 + nu)) [Pa]."""
         return self.elastic_modulus / (2.0 * (1.0 + self.poisson_ratio))
 
     @staticmethod
     def load(name: str, path: str | Path | None = None) -> "Material":
-        """The named material of a TOML file; None is the shipped `boom_model/data/materials.toml`.
+        """Load a material of a TOML file by name.
+
+        If path is None, load it from the shipped `boom_model/data/materials.toml`.
 
         Raises:
-            InputError: there is no such material, or the file cannot be read or breaks the form; names the key.
+            InputError: unknown material, or a file that cannot be read or has the wrong form. The
+                message names the key.
         """
         known = read_toml(MATERIALS_FILE if path is None else Path(path), _MaterialsTable).materials
         if name not in known:

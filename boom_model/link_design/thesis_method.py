@@ -1,10 +1,15 @@
-"""The thesis's two-stage search as its Appendix D does it: heights in steps of delta-H, stress first, then deflection.
+"""The thesis's two-stage search of Appendix D, with heights in steps of delta-H.
 
-Stage 1 walks from B to A and raises each slice until its von Mises stress is below the limit; a slice is as high as its station
-towards A. Stage 2 freezes the moments of stage 1 and raises, step by step, the station that takes most off the deflection. Both
-give Appendix D's contour without its repetitions: a slice starts its search at its neighbour's height, for heights grow towards
-A; and since a step at one station changes no other's gain, stage 2 is one sorted list of all steps (the tangents of eq. 3.36,
-which couple neighbours, are within 1e-9 of their angles).
+The first stage is for stress, the second for deflection.
+
+Stage 1 walks from B to A and raises each slice until its von Mises stress is below the limit. A
+slice is as high as its station on the side of A. Stage 2 freezes the moments of stage 1. Step by
+step, it raises the station that reduces the deflection most.
+
+Both stages give the contour of Appendix D without its repetitions. In stage 1, a slice starts its
+search at the height of its neighbour, because heights grow towards A. In stage 2, a step at one
+station does not change the gain at any other, so the result is one sorted list of all steps. (The
+tangents of eq. 3.36, which couple neighbours, differ from their angles by less than 1e-9.)
 """
 
 from dataclasses import dataclass
@@ -16,23 +21,26 @@ from boom_model.errors import InfeasibleError, InputError
 from boom_model.link_design.beam import Beam, LoadCases
 
 MOST_STEPS = 200_000
-"""Steps of delta-H that a station may be high."""
+"""Largest height of a station in steps of delta-H."""
 
 
 @dataclass(frozen=True, eq=False)
 class ThesisLoad:
-    """A load case as Appendix D has it, along frame 5. One instant that need not have been: each component is a largest one."""
+    """A load case in the form of Appendix D, along frame 5.
+
+    The loads need not occur at one instant: each component is the largest of a move.
+    """
 
     applied: Array
-    """(2,) sizes of the force at B along x and y [N]; it presses the link together and down."""
+    """(2,) |force| at B along x and y [N]; the force compresses the link and pushes it down."""
     acceleration: Array
-    """(3,) acceleration less gravity that Appendix D gives to frame 5 [m/s^2]."""
+    """(3,) acceleration minus gravity that Appendix D assigns to frame 5 [m/s^2]."""
     angular_velocity: Array
     angular_acceleration: Array
 
     @property
     def cases(self) -> LoadCases:
-        """As a load case of the beam: pressed together and down, and its own weight with it."""
+        """The load as a load case of the beam, including the link's own weight."""
         (ax, ay, _), (wx, wy, wz), spin = self.acceleration, self.angular_velocity, self.angular_acceleration[2]
         return LoadCases.of([-self.applied], [[[ax, -(wy**2 + wz**2)], [ay, spin + wx * wy]]])
 
@@ -43,54 +51,58 @@ THESIS_LOAD = ThesisLoad(
     angular_velocity=read_only([0.2933, 0.4231, 0.314]),
     angular_acceleration=read_only([0.3265, 0.3770, 0.2513]),
 )
-"""Thesis, section 3.5 with Appendix D's digits."""
+"""Load case of the thesis, section 3.5, with the digits of Appendix D."""
 
 THESIS_STEP = 1e-4
-"""delta-H [m]"""
+"""delta-H of the thesis [m]"""
 
 
 @dataclass(frozen=True, eq=False)
 class ThesisDesign:
-    """Both stages, at the stations from A to B."""
+    """Result of both stages, at the stations from A to B."""
 
     stress_heights: Array
-    """(n + 1,) after stage 1 [m]"""
+    """(n + 1,) heights after stage 1 [m]"""
     stress: Array
     """(n + 1,) von Mises stress of stage 1 [Pa]"""
     moments: Array
-    """(n + 1,) sizes of the bending moments, frozen after stage 1 [Nm]"""
+    """(n + 1,) absolute bending moments, frozen after stage 1 [Nm]"""
     coefficients: Array
     """(n + 1,) c of the deflection sum c / H^3 [m^4], eq. 3.36"""
     heights: Array
-    """(n + 1,) after stage 2 [m]"""
+    """(n + 1,) heights after stage 2 [m]"""
     stress_mass: float
-    """[kg], the slices being as high as their station towards A"""
+    """Mass after stage 1 [kg], with each slice as high as its station on the side of A"""
     mass: float
+    """Mass after stage 2 [kg]"""
     stress_deflection: float
-    """[m], by the method's own formula and frozen moments"""
+    """Deflection after stage 1 [m], by the method's formula and frozen moments"""
     deflection: float
+    """Deflection after stage 2 [m]"""
     steps: int
-    """of stage 2"""
+    """Number of steps of stage 2"""
 
 
 def thesis_design(
     beam: Beam, load: ThesisLoad, *, stress_limit: float, deflection_limit: float, step: float = THESIS_STEP
 ) -> ThesisDesign:
-    """The thesis's method (sections 3.3 and 3.4, Appendix D).
+    """Design a link by the thesis's method (sections 3.3 and 3.4, Appendix D).
 
     Args:
         beam: a cantilever.
-        load: its one load case.
+        load: its single load case.
         stress_limit: von Mises stress [Pa] that every station stays below.
-        deflection_limit: of the end [m].
+        deflection_limit: largest deflection of the end [m].
         step: delta-H [m].
 
     Raises:
-        InputError: a limit or the step is not above 0, the step is too small for the heights, or the beam is no cantilever.
-        InfeasibleError: a station would be more than MOST_STEPS steps high, and that more than a fifth of the length.
+        InputError: a limit or the step is not above 0, the step is too small for the heights, or
+            the beam is not a cantilever.
+        InfeasibleError: a station would be more than MOST_STEPS steps high, and higher than a fifth
+            of the length.
     """
     if beam.support != "cantilever":
-        raise InputError("the thesis's method is for a cantilever; a strut between two pins needs the exact method")
+        raise InputError("the thesis's method designs cantilevers only; use the exact method for a strut between two pins")
     for name, value in (("stress limit", stress_limit), ("deflection limit", deflection_limit), ("step", step)):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(f"{name} is {value:g}; it must be finite and above 0")
@@ -119,7 +131,7 @@ def thesis_design(
 
 
 def _stress_stage(beam: Beam, load: ThesisLoad, limit: float, step: float) -> tuple[Array, Array, Array]:
-    """Heights in steps, stresses and moments at the stations from A to B, by a walk from B to A."""
+    """Return heights in steps, stresses and moments from A to B, by a walk from B to A."""
     w, L, dx, n = beam.width, beam.length, beam.step, beam.slices
     density = beam.material.density
     fx, fy = map(float, load.applied)
@@ -136,7 +148,7 @@ def _stress_stage(beam: Beam, load: ThesisLoad, limit: float, step: float) -> tu
     while (found := stress(k * step, fx, fy, 0.0)) >= limit:
         k = _raised(k, step, L)
     steps[n], stresses[n] = k, found
-    mass = first = second = across_x = across_y = across_z = 0.0  # of the slices so far, about B
+    mass = first = second = across_x = across_y = across_z = 0.0  # sums over the slices so far, about B
     for i in range(1, n + 1):
         middle = (i - 0.5) * dx
         while True:
@@ -151,7 +163,7 @@ def _stress_stage(beam: Beam, load: ThesisLoad, limit: float, step: float) -> tu
             N = fx + total * (ax0 + ax1 * (L - com))
             V = fy + total * (ay0 + ay1 * (L - com))
             spin = Iz * turn + wx * wy * (Iy - Ix)
-            M = i * dx * V - com * (V - fy) - spin  # Appendix D's signs: its x runs from B, its rates along frame 5
+            M = i * dx * V - com * (V - fy) - spin  # signs of Appendix D: its x starts at B, its rates are along frame 5
             found = stress(H, N, V, M)
             if found < limit:
                 break
@@ -164,25 +176,32 @@ def _stress_stage(beam: Beam, load: ThesisLoad, limit: float, step: float) -> tu
 
 def _raised(k: int, step: float, length: float) -> int:
     if k >= MOST_STEPS:
-        raise _too_high(step, length, "to hold the stress, a slice")
+        raise _too_high(step, length, "the stress limit")
     return k + 1
 
 
 def _too_high(step: float, length: float, what: str) -> InputError | InfeasibleError:
-    """What stops a search at MOST_STEPS: the step, unless heights beyond a beam's are asked for."""
+    """Return the error for a search that reaches MOST_STEPS.
+
+    The step is too small if MOST_STEPS steps are less than a fifth of the length. Otherwise there
+    is no such link.
+    """
     most = MOST_STEPS * step
     if most < 0.2 * length * (1.0 - 1e-9):
         least = 0.2 * length / MOST_STEPS
-        return InputError(f"step is {step:g} m; {what} needs more than {MOST_STEPS} of it: {least:.2g} m is small enough")
-    return InfeasibleError(f"{what} needs more than {most:g} m of height: no such link")
+        return InputError(f"step is {step:g} m; {what} needs more than {MOST_STEPS} steps; use {least:.2g} m or more")
+    return InfeasibleError(f"{what} needs a height of more than {most:g} m, above a fifth of the length of {length:g} m")
 
 
 def _deflection_stage(start: Array, c: Array, limit: float, step: float, length: float) -> Array:
-    """Steps added at each station (n + 1,) until sum c / H^3 is at most the limit, each the one that takes most off."""
+    """Return the steps added at each station (n + 1,) until sum c / H^3 is at most the limit.
+
+    Each step is the one that reduces the deflection most.
+    """
     deflection = float((c / (step * start) ** 3).sum())
     if deflection <= limit:
         return np.zeros_like(start)
-    # No station needs to be higher than where its last step gains less than the greedy search's last step anywhere does.
+    # There are enough levels once every station's last step gains less than the last step taken.
     levels = 64
     while True:
         heights = step * (start[:, None] + np.arange(levels + 1))
@@ -194,4 +213,4 @@ def _deflection_stage(start: Array, c: Array, limit: float, step: float, length:
             return np.bincount(order[: last + 1] // levels, minlength=start.size).astype(float)
         levels *= 2
         if levels > MOST_STEPS:
-            raise _too_high(step, length, f"a deflection of {limit:g} m")
+            raise _too_high(step, length, f"the deflection limit of {limit:g} m")

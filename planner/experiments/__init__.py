@@ -1,0 +1,1 @@
+"""Measured motions: logs, the derivatives that they lack, and their comparison with a plan."""

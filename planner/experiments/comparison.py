@@ -1,15 +1,17 @@
-"""A measured motion beside its plan: joint and tip errors, and the torques of both.
+"""Comparison of a measured motion with its plan: joint errors, tip errors and torques.
 
-A log holds positions, and it may hold velocities, accelerations and torques. Encoders are noisy, and differentiating twice
-amplifies the noise of a step h by some 1/h^2. What a log lacks is therefore taken from a Savitzky-Golay filter: a cubic is
-fitted to the samples of a window about each sample, and its derivatives in the middle are the motion's. That assumes that
-the motion is a cubic within any window, and that the noise of a sample has nothing to do with that of the next. Then the
-filter, a weighted sum with weights w, makes noise of standard deviation sigma into one of
+A log contains positions. It may also contain velocities, accelerations and torques. Encoders are
+noisy, and two differentiations amplify the noise of a step h by about 1/h^2. Derivatives that a log
+lacks are therefore taken from a Savitzky-Golay filter: it fits a cubic to the samples in a window
+around each sample, and differentiates the cubic in the middle of the window. The filter assumes
+that the motion is a cubic within any window, and that the noise of different samples is
+independent. It is a weighted sum with weights w, so it turns noise of standard deviation sigma into
+noise of
 
     sigma sqrt(sum w^2),    about sigma sqrt(720 / N^5) / h^2 for accelerations from N positions.
 
-What that makes of the torques follows from their derivatives by q, qd and qdd, the last of which is M(q). A wider window passes
-less noise, and rounds off more of the motion.
+The effect on the torques follows from the derivatives of the torques by q, qd and qdd; the last of
+them is M(q). A wider window passes less noise, but distorts the motion more.
 """
 
 from dataclasses import dataclass
@@ -31,26 +33,32 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline
 
 WINDOW = 0.2
-"""Default width of the smoothing window [s]; our own choice: a twentieth of the main move."""
+"""Default width of the smoothing window [s].
+
+This is our own choice: one twentieth of the main move.
+"""
 
 _ORDER = 3
-_EVEN = 0.01  # steps that differ by less than this share count as even
-_SHIFTS = 50_000  # that the alignment tries at most, before it goes on between two of them
-_LOOKED_AT = 20_000  # samples of a log that it looks at there
+_EVEN = 0.01  # steps that differ by less than this fraction count as even
+_SHIFTS = 50_000  # largest number of shifts on the grid of the alignment
+_ALIGNMENT_SAMPLES = 20_000  # samples of a log that the final alignment uses
 _DIFFERENCE = 1e-5
-_WEIGHED = 200  # samples at which the torques' noise is worked out
+_NOISE_SAMPLES = 200  # samples at which the torque noise is computed
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A measured motion at times t (n,), in rad, m and s; each of the rest (n, 5), None where it was not measured."""
+    """A measured motion at times t (n,) in rad, m and s.
+
+    Each other field is (n, 5), or None if not measured.
+    """
 
     t: Array
     q: Array
     qd: Array | None = None
     qdd: Array | None = None
     tau: Array | None = None
-    """At the joints, behind the gearboxes [Nm, the extension's N]."""
+    """Torques at the joints, behind the gearboxes [Nm, the extension's N]."""
     notes: tuple[str, ...] = ()
 
     @staticmethod
@@ -62,10 +70,11 @@ class Log:
         tau: ArrayLike | None = None,
         notes: tuple[str, ...] = (),
     ) -> "Log":
-        """A log from arrays, checked.
+        """Return a log of checked arrays.
 
         Raises:
-            InputError: not finite, shapes that do not match, no sample, or times that do not increase.
+            InputError: a value is not finite, the shapes do not match, there is no sample, or the
+                times do not increase.
         """
         some = {"qd": qd, "qdd": qdd, "tau": tau}
         given = {name: checked(name, values, 5) for name, values in some.items() if values is not None}
@@ -77,10 +86,10 @@ class Log:
 
 
 def read_log(path: str | Path) -> Log:
-    """A log from CSV or Parquet: t, q1..q5, and any of qd1..qd5, qdd1..qdd5 and tau1..tau5.
+    """Read a log from CSV or Parquet: t, q1..q5, and any of qd1..qd5, qdd1..qdd5 and tau1..tau5.
 
     Raises:
-        InputError: as `read_motion`, but that qd may stand without qdd.
+        InputError: as `read_motion`, except that qd may be given without qdd.
     """
     data, notes = read_quantities(path)
     try:
@@ -91,29 +100,37 @@ def read_log(path: str | Path) -> Log:
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """A log with the derivatives that it lacks."""
+    """A log with the derivatives that it lacked."""
 
     trajectory: Trajectory
-    """Positions are the log's own; its notes say what was done."""
+    """The motion.
+
+    Its positions are those of the log; its notes say how the derivatives were found.
+    """
     tau: Array | None
-    """The log's."""
+    """Torques of the log."""
     noise: Array
-    """(5,) standard deviation of the positions' noise, by what the filter takes off [rad, m]"""
+    """(5,) standard deviation of the position noise, from what the filter removes [rad, m]"""
     covariance: Array
-    """(5, 3, 3) of the noise of each joint's q, qd and qdd; 0 for a qd or qdd that the log has"""
+    """(5, 3, 3) covariance of the noise of q, qd and qdd of each joint.
+
+    It is 0 for a qd or qdd that the log contains.
+    """
     inside: Mask
-    """(n,) True where the whole window lies in the log; towards its ends the filter's derivatives are worse"""
+    """(n,) True where the whole window lies in the log; the derivatives are worse near its ends."""
 
 
 def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
-    """The log with its derivatives: those that it has, as they are; velocities from its positions, and accelerations from its
-    velocities or else from its positions, by a cubic Savitzky-Golay filter over `window` seconds.
+    """Return the log with all derivatives.
 
-    A log whose steps differ by more than 1 % is first read off at even ones, along straight lines.
+    Derivatives that the log contains are kept. Velocities are computed from the positions, and
+    accelerations from the velocities of the log or else from its positions, by a cubic
+    Savitzky-Golay filter over `window` seconds. A log whose steps differ by more than 1 % is first
+    resampled at even steps by linear interpolation.
 
     Raises:
-        InputError: the window is not a positive number, holds less than 5 samples or more than the log has, or is shorter than
-            a gap in the log.
+        InputError: the window is not a positive number, contains fewer than 5 samples or more than
+            the log has, or is shorter than a gap in the log.
     """
     from scipy.signal import savgol_coeffs, savgol_filter
 
@@ -125,7 +142,7 @@ def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
     h = float(log.t[-1] - log.t[0]) / max(n - 1, 1)
     N = 2 * round(min(0.5 * window / h, n)) + 1 if h > 0.0 else 1
     if N < _ORDER + 2:
-        raise InputError(f"a window of {window:g} s holds {N} samples of a log with steps of {h:g} s; it must hold 5 at least")
+        raise InputError(f"a window of {window:g} s contains {N} samples of a log with steps of {h:g} s; it needs at least 5")
     if n < N:
         raise InputError(f"the log has {n} samples; a window of {window:g} s needs {N}")
 
@@ -134,28 +151,28 @@ def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
         return found
 
     def spread(values: Array) -> Array:
-        kept = float(savgol_coeffs(N, _ORDER)[N // 2])  # of its own noise, which a smoothed sample keeps
+        kept = float(savgol_coeffs(N, _ORDER)[N // 2])  # share of its own noise that a smoothed sample keeps
         removed = (values - derivative(values, 0))[inside]
         rms: Array = np.sqrt(np.mean(removed**2, axis=0) / (1.0 - kept))
         return rms
 
     inside = np.zeros(n, dtype=bool)
     inside[N // 2 : n - N // 2] = True
-    noise, by_filter = spread(log.q), f"by a cubic Savitzky-Golay filter over {N} samples, {(N - 1) * h:.4g} s"
+    noise, by_filter = spread(log.q), f"by a cubic Savitzky-Golay filter over {N} samples ({(N - 1) * h:.4g} s)"
     notes, qd, qdd = list(log.notes), log.qd, log.qdd
-    weights = np.zeros((3, N))  # of a window's positions in q, qd and qdd
+    weights = np.zeros((3, N))  # weights of the positions of a window in q, qd and qdd
     weights[0, N // 2] = 1.0
     rates = savgol_coeffs(N, _ORDER, deriv=1, delta=h, use="dot")
     from_velocities = np.zeros(5)
     if qd is None:
         qd, weights[1] = derivative(log.q, 1), rates
-        notes.append(f"velocities are not in the log: taken from its positions {by_filter}")
+        notes.append(f"the log has no velocities; they are computed from its positions {by_filter}")
     if qdd is None and log.qd is None:
         qdd, weights[2] = derivative(log.q, 2), savgol_coeffs(N, _ORDER, deriv=2, delta=h, use="dot")
-        notes.append(f"accelerations are not in the log: taken from its positions {by_filter}")
+        notes.append(f"the log has no accelerations; they are computed from its positions {by_filter}")
     elif qdd is None:
         qdd, from_velocities = derivative(qd, 1), spread(qd) * np.linalg.norm(rates)
-        notes.append(f"accelerations are not in the log: taken from its velocities {by_filter}")
+        notes.append(f"the log has no accelerations; they are computed from its velocities {by_filter}")
     covariance = noise[:, None, None] ** 2 * (weights @ weights.T)
     covariance[:, 2, 2] += from_velocities**2
     if log.qd is not None and log.qdd is not None:
@@ -176,63 +193,71 @@ def _even(log: Log, window: float) -> Log:
     t = np.linspace(log.t[0], log.t[-1], log.t.size)
     given = {name: values for name in ("q", "qd", "qdd", "tau") if (values := getattr(log, name)) is not None}
     read = {name: np.stack([np.interp(t, log.t, column) for column in values.T], axis=-1) for name, values in given.items()}
-    note = f"the log's steps, {steps.min():.4g} s to {steps.max():.4g} s, are not even: read off every {steps.mean():.4g} s"
+    spread = f"{steps.min():.4g} s to {steps.max():.4g} s"
+    note = f"the steps of the log are uneven ({spread}); it is resampled linearly every {steps.mean():.4g} s"
     return Log(t, notes=(*log.notes, note), **read)
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A plan and a log of it at common times: the log's, where the plan has something to say."""
+    """A plan and a log of it at common times: the times of the log that lie within the plan."""
 
     boom: Boom
     planned: Trajectory
-    """The plan at the common times, which count as its own do."""
+    """The plan at the common times, which are counted on the clock of the plan."""
     measured: Trajectory
-    """The log at them, with its derivatives."""
+    """The log at the common times, with its derivatives."""
     offset: float
-    """What was added to the log's times [s]."""
+    """Time added to the times of the log [s]."""
     best_offset: float
-    """The offset that makes the sum of the squared joint errors least, each joint as a share of its range [s]."""
+    """The offset that fits best [s].
+
+    It minimises the sum of squared joint errors, each joint relative to its range.
+    """
     tau_planned: Array
-    """(n, 5) by the model, of the plan"""
+    """(n, 5) torques of the plan, from the model"""
     tau_measured: Array
-    """(n, 5) by the model, of the measured motion"""
+    """(n, 5) torques of the measured motion, from the model"""
     tau_logged: Array | None
-    """(n, 5) as measured"""
+    """(n, 5) measured torques"""
     tip_planned: Array
     """(n, 3) in frame 1 [m]"""
     tip_measured: Array
     """(n, 3)"""
     noise: Array
-    """(5,) of the log's positions, see `Smoothed`"""
+    """(5,) noise of the positions of the log, see `Smoothed`"""
     torque_noise: Array
-    """(5,) standard deviation that the log's noise leaves in tau_measured: what differs by less may be noise"""
+    """(5,) standard deviation of tau_measured caused by the noise of the log.
+
+    Differences smaller than this may be noise.
+    """
     inside: Mask
-    """(n,) where tau_measured is as good as that; its peaks and means are taken there"""
+    """(n,) True where tau_measured has that accuracy; peaks and means are taken there."""
 
     @property
     def joint_error(self) -> Array:
-        """Measured less planned, (n, 5)."""
+        """Measured minus planned positions, (n, 5)."""
         return self.measured.q - self.planned.q
 
     @property
     def tip_error(self) -> Array:
-        """Distance of the two tips, (n,) [m]."""
+        """Distance between the two tips, (n,) [m]."""
         error: Array = np.linalg.norm(self.tip_measured - self.tip_planned, axis=-1)
         return error
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader must know of the two motions and of the model."""
+        """Notes on the plan, the log and the assumed friction."""
         given = zip(JOINTS, self.boom.friction.origins, strict=True)
+        assumed = [(joint, origin) for joint, origin in given if origin is not None and origin.basis is Basis.ASSUMED]
         return (
             *(f"plan: {note}" for note in self.planned.notes),
             *(f"log: {note}" for note in self.measured.notes),
-            *(f"{joint} friction is assumed: {o.source}" for joint, o in given if o is not None and o.basis is Basis.ASSUMED),
+            *(f"the friction of {joint} is assumed: {origin.source}" for joint, origin in assumed),
         )
 
     def to_json(self, files: dict[str, str]) -> dict[str, Any]:
-        """The JSON object of `boom compare`, in SI."""
+        """Return the JSON object of `boom compare`, in SI."""
         t, tip = self.planned.t, self.tip_error
         at = int(tip.argmax())
         everywhere = np.ones(len(t), dtype=bool)
@@ -278,22 +303,27 @@ def compare(
     window: float = WINDOW,
     payload_as: PayloadAs = "mass",
 ) -> Comparison:
-    """Plan and log at the log's times, as far as the plan goes.
+    """Compare a plan with a log, at the times of the log that lie within the plan.
 
-    The plan is interpolated: q by the cubic through its positions and velocities, qd by its derivative, qdd along straight
-    lines.
-    Torques are those of `torques`: on level ground, with friction where it is known, without the drives' own inertia.
+    The plan is interpolated: q by the cubic through its positions and velocities, qd by the
+    derivative of that cubic, and qdd linearly. The torques are those of `torques`: on level ground,
+    with friction where it is known, and without the drives' own inertia.
 
     Args:
-        offset: added to the log's times [s]; None takes the one that fits best, which also takes away a delay of the drives.
+        boom: the boom.
+        planned: the plan.
+        log: the measured motion.
+        offset: added to the times of the log [s]. None selects the offset that fits best, which
+            also removes a delay of the drives.
         window: see `smoothed`.
         payload_as: see `inverse_dynamics`.
 
     Raises:
-        InputError: as `smoothed`; the plan has a single sample; or log and plan have no two samples in common.
+        InputError: as `smoothed`; the plan has a single sample; or log and plan have fewer than two
+            samples in common.
     """
     if planned.t.size < 2:
-        raise InputError("the plan has a single sample; a comparison needs a motion")
+        raise InputError("the plan has a single sample; it needs at least 2")
     ready = smoothed(log, window)
     curve = _curve(planned)
     best = _best_offset(boom, planned, curve, ready.trajectory)
@@ -302,8 +332,8 @@ def compare(
     common = (t >= planned.t[0]) & (t <= planned.t[-1])
     if common.sum() < 2:
         raise InputError(
-            f"the log, from {t[0]:g} to {t[-1]:g} s with its offset of {offset:g} s, and the plan, from {planned.t[0]:g} to "
-            f"{planned.t[-1]:g} s, have no two samples in common; the offset that fits best is {best:g} s"
+            f"the log ({t[0]:g} to {t[-1]:g} s with its offset of {offset:g} s) and the plan ({planned.t[0]:g} to "
+            f"{planned.t[-1]:g} s) have fewer than two samples in common; the offset that fits best is {best:g} s"
         )
     t = t[common]
     qdd = np.stack([np.interp(t, planned.t, column) for column in planned.qdd.T], axis=-1)
@@ -332,7 +362,7 @@ TORQUE_HEADER = ("joint", "largest difference", "at", "RMS", "noise", "log: larg
 
 
 def position_cells(joint: dict[str, Any]) -> tuple[str, ...]:
-    """A joint of `Comparison.to_json` for people, under POSITION_HEADER."""
+    """Return a joint of `Comparison.to_json` as table cells under POSITION_HEADER."""
     position = joint["position"]
     error = position["error"]
     factor, unit = (1e3, "mm") if position["unit"] == "m" else (180.0 / np.pi, "deg")
@@ -341,7 +371,7 @@ def position_cells(joint: dict[str, Any]) -> tuple[str, ...]:
 
 
 def torque_cells(joint: dict[str, Any]) -> tuple[str, ...]:
-    """A joint of `Comparison.to_json` for people, under TORQUE_HEADER."""
+    """Return a joint of `Comparison.to_json` as table cells under TORQUE_HEADER."""
     torque = joint["torque"]
 
     def shown(found: dict[str, float | None] | None) -> tuple[str, str, str]:
@@ -354,13 +384,13 @@ def torque_cells(joint: dict[str, Any]) -> tuple[str, ...]:
 
 
 def summary(answer: dict[str, Any]) -> list[str]:
-    """`Comparison.to_json` in sentences: when, and where the tip was."""
+    """Return `Comparison.to_json` in sentences: times and offset, and the largest tip error."""
     tip = answer["tip"]
     where = ", ".join(f"{x:.3f}" for x in tip["planned_m"])
     return [
-        f"{answer['samples']} samples from {answer['from_s']:.3f} to {answer['to_s']:.3f} s; the log's times have "
-        f"{answer['offset_s']:.4f} s added, and {answer['best_offset_s']:.4f} s would fit best",
-        f"tip: up to {tip['peak_m'] * 1e3:.2f} mm off, at {tip['at_s']:.3f} s where ({where}) m was planned; "
+        f"{answer['samples']} samples from {answer['from_s']:.3f} to {answer['to_s']:.3f} s; offset of the log "
+        f"{answer['offset_s']:.4f} s, the offset that fits best is {answer['best_offset_s']:.4f} s",
+        f"tip error: at most {tip['peak_m'] * 1e3:.2f} mm, at {tip['at_s']:.3f} s near the planned point ({where}) m; "
         f"RMS {tip['rms_m'] * 1e3:.2f} mm",
     ]
 
@@ -372,9 +402,14 @@ def _curve(planned: Trajectory) -> "CubicHermiteSpline":
 
 
 def _best_offset(boom: Boom, planned: Trajectory, curve: "CubicHermiteSpline", measured: Trajectory) -> float:
-    """The least of the sum of squared errors, each joint as a share of its range; the plan rests before and after itself.
+    """Return the offset that minimises the sum of squared errors, each joint relative to its range.
 
-    At every shift k of a grid, sum_i (q_i - p_i+k)^2 = sum q_i^2 - 2 sum q_i p_i+k + sum p_i+k^2; then about the least of them.
+    The plan is at rest before its start and after its end. For every shift k on a grid, the cost
+    follows from a correlation:
+
+        sum_i (q_i - p_i+k)^2 = sum q_i^2 - 2 sum q_i p_i+k + sum p_i+k^2.
+
+    The search continues around the best shift of the grid.
     """
     from scipy.optimize import minimize_scalar
     from scipy.signal import correlate
@@ -396,7 +431,7 @@ def _best_offset(boom: Boom, planned: Trajectory, curve: "CubicHermiteSpline", m
         squares = np.concatenate([[0.0], np.cumsum(p[:, i] ** 2)])
         cost += squares[log_grid.size :] - squares[: -log_grid.size] - 2.0 * correlate(p[:, i], q, mode="valid", method="fft")
     coarse = float(plan_grid[cost.argmin()] - first)
-    some = slice(None, None, max(1, measured.t.size // _LOOKED_AT))
+    some = slice(None, None, max(1, measured.t.size // _ALIGNMENT_SAMPLES))
     t, q = measured.t[some], (measured.q[some] - planned.q[0]) * weight
 
     def error(offset: float) -> float:
@@ -407,11 +442,14 @@ def _best_offset(boom: Boom, planned: Trajectory, curve: "CubicHermiteSpline", m
 
 
 def _torque_noise(boom: Boom, plan: Trajectory, covariance: Array, payload_as: PayloadAs) -> Array:
-    """Root mean square over some of the samples of what noise of that covariance makes of the torques, (5,):
+    """Return the standard deviation (5,) of the torques for a given covariance of the motion.
 
-    var(tau_i) = sum_j D_ij^T covariance_j D_ij,    D_ij = (dtau_i/dq_j, dtau_i/dqd_j, dtau_i/dqdd_j).
+    It is the root mean square over some of the samples of
+
+        var(tau_i) = sum_j D_ij^T covariance_j D_ij,
+        D_ij = (dtau_i/dq_j, dtau_i/dqd_j, dtau_i/dqdd_j).
     """
-    some = slice(None, None, max(1, plan.t.size // _WEIGHED))
+    some = slice(None, None, max(1, plan.t.size // _NOISE_SAMPLES))
     state = [values[some, None, :] for values in (plan.q, plan.qd, plan.qdd)]
     steps = _DIFFERENCE * np.eye(5)
 
@@ -426,7 +464,10 @@ def _torque_noise(boom: Boom, plan: Trajectory, covariance: Array, payload_as: P
 
 
 def _extremes(t: Array, values: Array, where: Mask) -> dict[str, float | None]:
-    """Of values (n,): the one of largest size and when, root mean square and mean; None where nothing is looked at."""
+    """Return peak, time of the peak, root mean square and mean of values (n,) in a mask.
+
+    All are None if the mask is empty.
+    """
     t, values = t[where], values[where]
     if not values.size:
         return dict.fromkeys(("peak", "at_s", "rms", "mean"))

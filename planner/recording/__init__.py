@@ -1,8 +1,12 @@
-"""Motions as Rerun files: the moving linkage beside its instruments. The only package that knows Rerun.
+"""Rerun recordings of motions: the moving linkage with its plots beside it.
 
-Every recording's timeline is "t", in seconds from the motion's start. What each holds stands at the function that writes it.
-The linkage comes solved: each body's frame is a child of the mount, because a frame has one parent and a closed loop cannot
-be shown. The solids' lengths are the model's, their thickness is for the eye only. Colours are Okabe and Ito's.
+This is the only package that imports Rerun. Every recording has the timeline "t", in seconds from
+the start of the motion. The docstring of each `write_...` function lists the entities that it
+writes.
+
+The poses of the linkage are solved before they are logged. The frame of every body is a child of
+the mount, because a Rerun frame has one parent and so cannot represent a closed loop. The solids
+have the lengths of the model; their thickness is for display only. The colours are Okabe and Ito's.
 """
 
 from planner.recording.comparison import write_comparison_recording

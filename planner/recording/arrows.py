@@ -1,4 +1,4 @@
-"""Pin forces and the wrench on the mount as arrows over time."""
+"""Pin forces and the wrench on the mount, drawn as arrows over time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,22 +14,27 @@ from planner.recording.scene import POSES_AT_ONCE
 from planner.recording.stream import time_column
 
 LONGEST = 0.9
-"""Bound of the longest arrow [m]."""
+"""Upper bound of the length of the longest arrow [m]."""
 
-_PIN_END = 0.1  # [m]: at the pin's end on the boom's right, clear of the links
-_PINS = {6: "of the lower link on the outer", 7: "of the outer link on the upper", 8: "of the inner link on the upper"}
+_PIN_END = 0.1  # [m]: distance to the end of the pin on the boom's right, clear of the links
+_PINS = {
+    6: "force of the lower link on the outer link",
+    7: "force of the outer link on the upper link",
+    8: "force of the inner link on the upper link",
+}
 _FORCE, _MOMENT = LIGHT, PURPLE
 
 
-WHAT_ARROWS_SHOW = (
-    f"Arrows, to the scale in the view's title: the force {', '.join(f'{name} at pin {pin}' for pin, name in _PINS.items())}, "
-    "from the pin's end; force and moment of the boom on its mount, from the origin of frame 1."
+ARROWS_NOTE = (
+    "The title of the 3D view gives the scale of the arrows. Pin forces start at the end of their pin: "
+    f"{'; '.join(f'pin {pin}, {name}' for pin, name in _PINS.items())}. "
+    "The force and the moment of the boom on its mount start at the origin of frame 1."
 )
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What a metre of arrow stands for; None where there is nothing to draw."""
+    """Force and moment that one metre of arrow stands for; None where there is nothing to draw."""
 
     force: float | None
     """[N]"""
@@ -38,24 +43,27 @@ class Scale:
 
     @property
     def sentence(self) -> str:
-        """For a title."""
+        """The scale as text for a title."""
         shown = [f"1 m = {value:g} {unit}" for value, unit in ((self.force, "N"), (self.moment, "Nm")) if value is not None]
         return f"arrows: {', '.join(shown)}" if shown else "no arrows"
 
 
 def arrow_scale(loads: Loads) -> Scale:
-    """The least of 1, 2, 5, 10... N and Nm a metre that keep every arrow of a motion below LONGEST."""
+    """Return the scale that keeps every arrow of a motion shorter than LONGEST.
+
+    Each value is the smallest of 1, 2, 5, 10, ... N or Nm per metre that does so.
+    """
     if loads.pins is None or loads.mount is None:
         return Scale(None, None)
     forces = [*(getattr(loads.pins, f"frame_{pin}") for pin in _PINS), loads.mount[:, :3]]
-    return Scale(_round_up(max(_largest(force) for force in forces)), _round_up(_largest(loads.mount[:, 3:])))
+    return Scale(_round_scale(max(_largest(force) for force in forces)), _round_scale(_largest(loads.mount[:, 3:])))
 
 
 def _largest(vectors: Array) -> float:
     return float(np.sqrt((vectors**2).sum(axis=-1).max()))
 
 
-def _round_up(largest: float) -> float | None:
+def _round_scale(largest: float) -> float | None:
     if not largest > 0.0:
         return None
     least = largest / LONGEST
@@ -64,13 +72,17 @@ def _round_up(largest: float) -> float | None:
 
 
 def log_arrows(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, loads: Loads, scale: Scale) -> None:
-    """Forces at pins 6, 7 and 8, and force and moment of the boom on its mount, in "mount" to that scale."""
+    """Log the forces at pins 6, 7 and 8, and the force and moment of the boom on its mount.
+
+    The arrows are drawn in the frame "mount", to the given scale. Nothing is logged for loads
+    without pin forces or without the wrench on the mount.
+    """
     if loads.pins is None or loads.mount is None:
         return
     for pin in _PINS:
-        _log_look(recording, f"pin_{pin}", f"pin {pin}", _FORCE)
-    _log_look(recording, "mount_force", "force", _FORCE)
-    _log_look(recording, "mount_moment", "moment", _MOMENT)
+        _log_style(recording, f"pin_{pin}", f"pin {pin}", _FORCE)
+    _log_style(recording, "mount_force", "force", _FORCE)
+    _log_style(recording, "mount_moment", "moment", _MOMENT)
     for start in range(0, len(t), POSES_AT_ONCE):
         part = slice(start, start + POSES_AT_ONCE)
         for name, origins, vectors in _arrows(boom, q[part], loads, part, scale):
@@ -79,7 +91,7 @@ def log_arrows(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, lo
 
 
 def _arrows(boom: Boom, q: Array, loads: Loads, part: slice, scale: Scale) -> Iterator[tuple[str, Array, Array]]:
-    """Name, foot and vector (n, 3) [m] of each arrow."""
+    """Yield the name, the foot (n, 3) [m] and the vector (n, 3) [m] of each arrow."""
     assert loads.pins is not None
     assert loads.mount is not None
     c, s = np.cos(q[:, 0]), np.sin(q[:, 0])
@@ -100,6 +112,6 @@ def _arrows(boom: Boom, q: Array, loads: Loads, part: slice, scale: Scale) -> It
         yield "mount_moment", foot, loads.mount[part, 3:] / scale.moment
 
 
-def _log_look(recording: rr.RecordingStream, name: str, label: str, color: Color) -> None:
-    look = rr.Arrows3D.from_fields(colors=[color], radii=[0.02], labels=[label], show_labels=True)
-    recording.log(f"world/loads/{name}", look, rr.CoordinateFrame("mount"), static=True)
+def _log_style(recording: rr.RecordingStream, name: str, label: str, color: Color) -> None:
+    style = rr.Arrows3D.from_fields(colors=[color], radii=[0.02], labels=[label], show_labels=True)
+    recording.log(f"world/loads/{name}", style, rr.CoordinateFrame("mount"), static=True)

@@ -1,4 +1,4 @@
-"""A measured motion over its plan."""
+"""Recording of a measured motion together with its plan."""
 
 from pathlib import Path
 
@@ -24,22 +24,29 @@ from planner.recording.scene import (
 )
 from planner.recording.stream import log_markdown, save
 
-_LEGEND = "Solid bodies and the light path: measured. Edges and the orange path: planned."
+_LEGEND = "Solid bodies and the light path show the measured motion. Edges and the orange path show the plan."
 
 
 def write_comparison_recording(path: str | Path, comparison: Comparison) -> None:
-    """Writes a measured motion over its plan, with its blueprint. The entities are those of a move, but that
+    """Write the recording of a measured motion and its plan, with its blueprint.
 
-    /world/boom             is the measured motion, solid, and /world/tip_path its tip's
-    /world/planned          is the planned one, its edges alone; frames "planned <body>" in "mount"; and its tip's path
-    /plots/<quantity>/<joint>   q and tau hold both, tau the measured torques too where the log has them
-    /plots/error/<joint>    measured less planned, in deg and m; /plots/error/tip the distance of the tips [mm]
+    The entities are those of a move (see `write_recording`), with these differences:
+
+    /world/boom                 the measured motion, with solid bodies; /world/tip_path is the path
+                                of its tip
+    /world/planned              the planned motion: edges only, frames "planned <body>" in "mount",
+                                and the path of its tip
+    /plots/<quantity>/<joint>   planned and measured q and tau; measured torques too, where the log
+                                has them
+    /plots/error/<joint>        measured minus planned position [deg, m]
+    /plots/error/tip            distance between the two tips [mm]
 
     Args:
         path: the .rrd file.
+        comparison: the plan and the log at common times.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written. An existing file is left unchanged.
     """
     boom, planned, measured = comparison.boom, comparison.planned, comparison.measured
     bundles = _bundles(comparison)
@@ -71,7 +78,7 @@ def _bundles(c: Comparison) -> dict[str, list[Bundle]]:
     tabs: dict[str, list[Bundle]] = {"Errors": [], "Torques": [], "Positions": []}
     millimetres = c.tip_error[:, None] * 1e3
     tabs["Errors"].append(
-        Bundle("plots/error/tip", "distance of the tips [mm]", ["distance [mm]"], [PAYLOAD_COLOR], millimetres)
+        Bundle("plots/error/tip", "distance between the tips [mm]", ["distance [mm]"], [PAYLOAD_COLOR], millimetres)
     )
     for i, joint in enumerate(JOINTS):
         unit, force = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
@@ -80,9 +87,9 @@ def _bundles(c: Comparison) -> dict[str, list[Bundle]]:
         positions = np.stack([for_people(i, motion.q[:, i]) for motion in (c.planned, c.measured)], axis=-1)
         tabs["Positions"].append(Bundle(f"plots/q/{joint}", f"{joint} position [{unit}]", pair, both, positions))
         error = for_people(i, c.joint_error[:, i, None])
-        title = f"{joint}: measured less planned [{unit}]"
-        tabs["Errors"].append(Bundle(f"plots/error/{joint}", title, ["measured less planned"], [color], error))
-        names, colors, torques = ["planned", "measured motion, by the model"], both, [c.tau_planned, c.tau_measured]
+        title = f"{joint}: measured minus planned [{unit}]"
+        tabs["Errors"].append(Bundle(f"plots/error/{joint}", title, ["measured minus planned"], [color], error))
+        names, colors, torques = ["planned", "model, from the measured motion"], both, [c.tau_planned, c.tau_measured]
         if c.tau_logged is not None:
             names, colors = [*names, "measured"], [*both, PAYLOAD_COLOR]
             torques.append(c.tau_logged)

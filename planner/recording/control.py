@@ -1,4 +1,4 @@
-"""A study of the closed loop."""
+"""Recording of a closed-loop study."""
 
 from pathlib import Path
 
@@ -18,20 +18,26 @@ from planner.recording.stream import log_markdown, log_png, save
 
 
 def write_control_recording(path: str | Path, study: Study, *, step: float = 0.005) -> None:
-    """Writes a study's recording: the boom as the first case moves it, every case's curves, pictures and report.
+    """Write the recording of a study, with its blueprint.
+
+    It shows the boom as the first case moves it, the curves of every case, the pictures and the
+    report:
 
     /world                                    the boom following the first case
-    /tip_error/<profile>/<shaper>             of every controller [mm]
-    /cases/<profile>/<controller>/<shaper>/   q/<joint> commanded, link and motor; error/<joint>; tau/<joint> asked and limit
-    /pictures/loops, /pictures/errors         Bode, poles and the tip's error as images
+    /tip_error/<profile>/<shaper>             tip error of every controller [mm]
+    /cases/<profile>/<controller>/<shaper>/   q/<joint>: command, link and motor; error/<joint>;
+                                              tau/<joint>: torque and limit
+    /pictures/loops, /pictures/errors         Bode plots, poles and tip errors as images
     /report                                   the report as Markdown
 
     Args:
         path: the .rrd file.
-        step: sampling step of the curves [s]; a controller's own period would make a file of some 100 MB.
+        study: the closed-loop study.
+        step: sampling step of the curves [s]. Sampling at the controller's own period would make a
+            file of about 100 MB.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written. An existing file is left unchanged.
     """
     run, boom = study.run, study.boom
     every = slice(None, None, max(1, round(step / float(run.t[1]))))
@@ -64,7 +70,7 @@ def write_control_recording(path: str | Path, study: Study, *, step: float = 0.0
 
 
 def _tip_errors(study: Study, every: slice) -> list[Bundle]:
-    """The tip's error of all controllers, by profile and shaper."""
+    """Return the tip error of all controllers, grouped by profile and shaper."""
     groups: dict[tuple[str, str], list[int]] = {}
     for b, row in enumerate(study.rows):
         groups.setdefault((row.profile, row.shaper), []).append(b)
@@ -81,7 +87,7 @@ def _tip_errors(study: Study, every: slice) -> list[Bundle]:
 
 
 def _case_bundles(study: Study, b: int, every: slice, name: str) -> list[Bundle]:
-    """Of case b: commanded and actual position, error, and torque with its limit, of each joint."""
+    """Return position, error and torque with its limit of each joint, for case b."""
     run = study.run
     ours, theirs = COLORS["extension"], COLORS["upper"]
     bundles = []
@@ -89,10 +95,10 @@ def _case_bundles(study: Study, b: int, every: slice, name: str) -> list[Bundle]
         unit, torque = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
         q = [for_people(i, x[every, b, i]) for x in (run.command, run.q, run.motor)]
         limit = run.limit[every, b, i]
-        tau, names = [run.torque[every, b, i]], ["asked of the drive"]
+        tau, names = [run.torque[every, b, i]], ["drive torque"]
         if np.isfinite(limit).all():
             tau += [limit, -limit]
-            names += ["motor's limit (estimated)"] * 2
+            names += ["motor limit (estimated)"] * 2
         bundles += [
             Bundle(
                 f"cases/{name}/q/{joint}",

@@ -1,4 +1,4 @@
-"""What motors and gearboxes bear over time beside their ratings, their margins, and what the tip deflects."""
+"""Motor and gearbox loads over time with ratings and margins; the tip deflection."""
 
 from collections.abc import Iterator
 
@@ -21,11 +21,11 @@ from planner.recording.palette import (
 from planner.recording.plots import Bundle
 
 MOST_MARGIN = 3.0
-"""Where the curves of margins are cut off: nothing asked is an infinite margin."""
+"""Margins are plotted up to this value; a margin is infinite where the demand is zero."""
 
 
 def motor_bundles(move: Move) -> Iterator[Bundle]:
-    """Each motor's torque beside its curve, as sizes."""
+    """Yield the absolute torque of each motor together with its torque-speed limit."""
     motion = move.trajectory
     for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
         if drive is None:
@@ -41,7 +41,7 @@ def motor_bundles(move: Move) -> Iterator[Bundle]:
 
 
 def gearbox_bundles(move: Move) -> Iterator[Bundle]:
-    """Each gearbox's torque beside its ratings, as sizes."""
+    """Yield the absolute torque of each gearbox together with its ratings."""
     tau = np.abs(move.loads.tau)
     for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
         if drive is None:
@@ -60,9 +60,10 @@ def gearbox_bundles(move: Move) -> Iterator[Bundle]:
 
 
 def margin_bundles(move: Move) -> Iterator[Bundle]:
-    """Margins (limit - demand) / demand over time [%], as the checks count them, beside what is required.
+    """Yield the margins (limit - demand) / demand [%] over time, with the required margins.
 
-    Of each gearbox to its start-stop and its momentary peak torque, of each motor to what its curve leaves.
+    The margin is computed as in the checks. It is shown for the start-stop and the momentary peak
+    torque of each gearbox, and for the torque-speed curve of each motor.
     """
     motion, tau = move.trajectory, np.abs(move.loads.tau)
     for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
@@ -87,20 +88,20 @@ def margin_bundles(move: Move) -> Iterator[Bundle]:
 
 
 def margin(demand: Array, limit: Array) -> Array:
-    """(limit - demand) / demand (n,), at most MOST_MARGIN."""
+    """Return (limit - demand) / demand (n,), limited to MOST_MARGIN."""
     spare = limit - demand
     least = np.maximum(demand, limit / (1.0 + MOST_MARGIN) + np.finfo(float).tiny)
     return np.minimum(spare / least, MOST_MARGIN)
 
 
 def tip_bundle(move: Move) -> Bundle:
-    """The error budget of the tip [mm]."""
+    """Return the error budget of the tip [mm]."""
     budget = tip_deflection(move.boom, move.trajectory.q, move.loads.tau)
     parts = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
-    names = [f"{name} [mm]" for name in ("wind-up", "hysteresis", "backlash", "step error", "in all")]
+    names = [f"{name} [mm]" for name in ("wind-up", "hysteresis", "backlash", "step error", "total")]
     values = np.stack(parts, axis=-1) * 1e3
     colors = [SKY_BLUE, ORANGE, GREEN, PURPLE, TOTAL_COLOR]
-    return Bundle("plots/tip/deflection", "tip's deflection by the drives, at most [mm]", names, colors, values)
+    return Bundle("plots/tip/deflection", "largest tip deflection caused by the drives [mm]", names, colors, values)
 
 
 def _basis(drive: Drive) -> Basis:

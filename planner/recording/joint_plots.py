@@ -1,4 +1,4 @@
-"""Every joint's position, rates and torque beside their limits, where the torques come from, and pins and mount."""
+"""Joint positions, rates and torques with limits; torque parts; pin forces and mount loads."""
 
 from collections.abc import Iterator
 
@@ -25,11 +25,14 @@ from planner.recording.palette import (
 from planner.recording.plots import Bundle, Plot, for_people
 
 MOST_RATIO = 5.0
-"""Where the curves of torque / limit are cut off: a motor too fast for any torque has no bound."""
+"""Torque ratios are plotted up to this value.
+
+The ratio of a motor too fast to give any torque is infinite.
+"""
 
 
 def position_plots(boom: Boom, trajectory: Trajectory) -> list[Plot]:
-    """Joint positions, and the angle between the driven links."""
+    """Return the joint positions, and the angle between the driven links."""
     limits = boom.limits
     linkage = Plot(
         "plots/q/linkage",
@@ -44,19 +47,19 @@ def position_plots(boom: Boom, trajectory: Trajectory) -> list[Plot]:
 
 
 def velocity_plots(boom: Boom, trajectory: Trajectory) -> list[Plot]:
-    """Joint velocities."""
+    """Return the joint velocities."""
     most = boom.limits.velocity
     return list(_joint_plots(boom, "qd", "velocity", "/s", trajectory.qd, -most, most))
 
 
 def acceleration_plots(boom: Boom, trajectory: Trajectory) -> list[Plot]:
-    """Joint accelerations."""
+    """Return the joint accelerations."""
     most = boom.limits.acceleration
     return list(_joint_plots(boom, "qdd", "acceleration", "/s^2", trajectory.qdd, -most, most))
 
 
 def _joint_plots(boom: Boom, quantity: str, name: str, per: str, values: Array, lower: Array, upper: Array) -> Iterator[Plot]:
-    """One of q, qd and qdd: values (n, 5) between lower and upper (5,), in SI."""
+    """Yield a plot per joint of q, qd or qdd: values (n, 5) between lower and upper (5,), in SI."""
     for i, joint in enumerate(JOINTS):
         low, high = for_people(i, np.array([lower[i], upper[i]]))
         yield Plot(
@@ -71,24 +74,28 @@ def _joint_plots(boom: Boom, quantity: str, name: str, per: str, values: Array, 
 
 
 def torque_plots(boom: Boom, trajectory: Trajectory, tau: Array) -> Iterator[Plot]:
-    """Joint torques beside what the drive leaves for them, sample by sample.
+    """Yield the joint torques with the limits of their drives, sample by sample.
 
-    That is -T - J qdd to T - J qdd, with T(qd) what the drive allows at the joint's speed and J its own inertia, which it
-    drives too: a curve between its limits is a drive that keeps `drive_torque_limit`.
+    The limits are -T - J qdd and T - J qdd. T(qd) is the torque that the drive allows at the speed
+    of the joint. J is the drive's own inertia, which the drive accelerates too. A torque between
+    its limits respects `drive_torque_limit`.
     """
     for i, (joint, drive) in enumerate(zip(JOINTS, boom.drives, strict=True)):
         limit = None if drive is None else drive_torque_limit(drive, trajectory.qd[:, i])
         limits: dict[str, float | Array] = {}
         if drive is not None and limit is not None:
             own = drive_inertia(drive) * trajectory.qdd[:, i]
-            limits = {"drive's lower limit": -limit - own, "drive's upper limit": limit - own}
+            limits = {"lower drive limit": -limit - own, "upper drive limit": limit - own}
         basis = Basis.weakest([Basis.ESTIMATED, *([] if drive is None else [o.basis for o in drive.supply_origins])])
         name = "force" if IS_LENGTH[i] else "torque"
         yield Plot(f"plots/tau/{joint}", f"{joint} {name}", LOAD_UNITS[i], JOINT_COLORS[joint], tau[:, i], limits, basis)
 
 
 def ratio_bundles(ratios: dict[str, Array]) -> list[Bundle]:
-    """Torque / limit of every driven joint, in one view beside 1; none where no drive's limit is known."""
+    """Return torque / limit of every driven joint, in one view with a line at 1.
+
+    The list is empty where no drive limit is known.
+    """
     if not ratios:
         return []
     values = [*(np.minimum(ratio, MOST_RATIO) for ratio in ratios.values())]
@@ -99,7 +106,7 @@ def ratio_bundles(ratios: dict[str, Array]) -> list[Bundle]:
 
 
 def part_bundles(parts: Breakdown) -> Iterator[Bundle]:
-    """Each joint's torque in parts that add up to it."""
+    """Yield the parts of each joint torque, which add up to it."""
     names, each, total = [*PART_COLORS, "total"], [getattr(parts, name) for name in PART_COLORS], parts.total
     for i, joint in enumerate(JOINTS):
         unit = LOAD_UNITS[i]
@@ -108,12 +115,12 @@ def part_bundles(parts: Breakdown) -> Iterator[Bundle]:
 
 
 def load_bundles(mount: Mount, loads: Loads) -> Iterator[Bundle]:
-    """Force and moment on the mount, and the sizes of the forces at the pins."""
+    """Yield the force and the moment on the mount, and the magnitudes of the pin forces."""
     if loads.mount is None or loads.pins is None:
         return
     for kind, unit, columns, limit in (("force", "N", slice(0, 3), mount.force), ("moment", "Nm", slice(3, 6), mount.moment)):
         vectors = loads.mount[:, columns]
-        names, colors = ["x", "y", "z", "size"], [SKY_BLUE, ORANGE, PURPLE, GREY]
+        names, colors = ["x", "y", "z", "magnitude"], [SKY_BLUE, ORANGE, PURPLE, GREY]
         series = [*vectors.T, np.linalg.norm(vectors, axis=-1)]
         if limit is not None:
             names.append("limit" if limit.origin.basis is Basis.PRINTED else f"limit ({limit.origin.basis})")
@@ -124,4 +131,4 @@ def load_bundles(mount: Mount, loads: Loads) -> Iterator[Bundle]:
     pins = {6: loads.pins.frame_6, 7: loads.pins.frame_7, 8: loads.pins.frame_8}
     sizes = np.stack([np.linalg.norm(force, axis=-1) for force in pins.values()], axis=-1)
     names = [f"pin {pin} [N]" for pin in pins]
-    yield Bundle("plots/pins", "forces at the pins, in size [N]", names, [YELLOW, GREEN, SKY_BLUE], sizes)
+    yield Bundle("plots/pins", "magnitude of the pin forces [N]", names, [YELLOW, GREEN, SKY_BLUE], sizes)

@@ -1,4 +1,4 @@
-"""How a recording is shown: the scene on the left, tabs on the right."""
+"""Layout of a recording: the scene on the left, tabs on the right."""
 
 from collections.abc import Iterable, Sequence
 
@@ -13,24 +13,24 @@ from planner.recording.plots import Bundle, Plot
 
 
 def grid(name: str, plots: Iterable[Plot | Bundle]) -> rrb.Grid:
-    """A tab of plots, two beside each other where there are more than two."""
+    """Return a tab of plots, in two columns if there are more than two."""
     views = [plot.view for plot in plots]
     return rrb.Grid(*views, grid_columns=2 if len(views) > 2 else 1, name=name)
 
 
 def text(entity: str, name: str) -> rrb.TextDocumentView:
-    """A tab of Markdown."""
+    """Return a tab that shows a Markdown document."""
     return rrb.TextDocumentView(origin=f"/{entity}", name=name)
 
 
 def scene(title: str, eye: rrb.EyeControls3D, ground: float = 0.0) -> rrb.Spatial3DView:
-    """The view of /world, with a grid at the height of the ground [m]."""
+    """Return the view of /world, with a grid at the height of the ground [m]."""
     grid = rrb.LineGrid3D(plane=rr.components.Plane3D.XY.with_distance(ground), color=(70, 70, 70))
     return rrb.Spatial3DView(origin="/world", name=title, eye_controls=eye, line_grid=grid)
 
 
 def shown_beside(left: rrb.View | rrb.Container, right: rrb.View | rrb.Container, shares: Sequence[float]) -> rrb.Blueprint:
-    """A blueprint without the viewer's own panels."""
+    """Return a blueprint of two parts side by side, with the viewer's own panels collapsed."""
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=shares),
         rrb.TimePanel(timeline="t", state="collapsed"),
@@ -40,14 +40,23 @@ def shown_beside(left: rrb.View | rrb.Container, right: rrb.View | rrb.Container
 
 
 def eye_of(boom: Boom, *motions: Array) -> rrb.EyeControls3D:
-    """From the boom's right at the middle of its first motion (n, 5), a little from above, and far enough off to see all."""
+    """Return a camera that sees all the motions (n, 5).
+
+    It looks from the right of the boom at the middle of the first motion, slightly from above.
+    """
     some = np.concatenate([q[:: max(1, len(q) // 1000)] for q in motions])
     points = frame_transforms(boom, some, "outer")[..., :3, 3].reshape(-1, 3)
     return eye_on(points, float(motions[0][len(motions[0]) // 2, 0]))
 
 
 def eye_on(points: Array, yaw: float, away: float = 0.95) -> rrb.EyeControls3D:
-    """From the right of a boom at `yaw`, a little from above, and far enough `away` to see all points (k, 3)."""
+    """Return a camera that sees all points (k, 3) from the right of a boom, slightly from above.
+
+    Args:
+        points: (k, 3) points to see [m].
+        yaw: direction of the boom [rad].
+        away: distance of the camera as a multiple of the extent of the points.
+    """
     center = (points.min(axis=0) + points.max(axis=0)) / 2.0
     direction = np.array([np.sin(yaw), -np.cos(yaw), 0.5])
     distance = 0.5 + away * float(np.linalg.norm(np.ptp(points, axis=0)))

@@ -1,4 +1,4 @@
-"""A designed link on the boom."""
+"""Recording of a designed link on the boom."""
 
 import tempfile
 from pathlib import Path
@@ -20,18 +20,22 @@ from planner.recording.stream import log_markdown, log_png, save
 
 
 def write_link_recording(path: str | Path, design: LinkDesign) -> None:
-    """Writes a designed link on the boom along its first move, the joint's torque before and after, the picture and the report.
+    """Write the recording of a designed link along the first of its moves.
 
-    /world/boom/<link>/plates    the designed plates, in their own place and thickness, over the linkage's plain solids
-    /plots/torque/<link>         the joint's torque with the original link and the designed one
+    It shows the torque of the joint before and after the change, the picture and the report:
+
+    /world/boom/<link>/plates    the designed plates at their true place and thickness, on the plain
+                                 solids of the linkage
+    /plots/torque/<link>         torque of the joint with the original and with the designed link
     /picture                     contour, stress, convergence, torque and mass: see `link_picture`
     /report                      the report as Markdown
 
     Args:
         path: the .rrd file.
+        design: the designed link.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written. An existing file is left unchanged.
     """
     boom, trajectory, link = design.after, design.trajectories[0], design.link
     before, after = (torque[: trajectory.t.size] for torque in design.torques)
@@ -72,7 +76,10 @@ def write_link_recording(path: str | Path, design: LinkDesign) -> None:
 
 
 def _log_plates(recording: rr.RecordingStream, design: LinkDesign) -> None:
-    """The plates as boxes, a hundred along the link: a mesh would need normals, and a box shows its edges."""
+    """Log each plate as a hundred boxes along the link.
+
+    Boxes show their edges; a mesh would need normals.
+    """
     link, beam = design.link, design.beam
     edges = np.linspace(0.0, link.length, 101)
     middle = (edges[1:] + edges[:-1]) / 2.0
@@ -80,7 +87,7 @@ def _log_plates(recording: rr.RecordingStream, design: LinkDesign) -> None:
     thickness = beam.width / beam.plates
     across = np.linspace(-0.5, 0.5, beam.plates) * link.spacing if beam.plates > 1 else np.zeros(1)
     centers = np.array([(x, 0.0, z) for z in across for x in middle])
-    if link.name == "extension":  # from its root to the wrist, where its frame stands
+    if link.name == "extension":  # the beam runs from its root to the wrist, where the frame of the extension is
         centers = (centers - [link.length, 0.0, 0.0]) * [-1.0, 1.0, 1.0]
     sizes = np.tile(np.stack([np.diff(edges) / 2.0, half, np.full_like(half, thickness / 2.0)], axis=-1), (beam.plates, 1))
     R = R_LINK_BODY[link.name]

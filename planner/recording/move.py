@@ -1,4 +1,4 @@
-"""A move as an instrument panel."""
+"""Recording of a move: the 3D scene with all its plots and documents."""
 
 from pathlib import Path
 
@@ -23,36 +23,47 @@ from planner.reports.drive_pictures import drive_picture
 
 
 def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = None) -> None:
-    """Writes a move's recording with its blueprint; `boom view` or `rerun` shows it.
+    """Write the recording of a move with its blueprint; `boom view` or `rerun` shows it.
 
-    /world                    z up, the ground; frames hang from "tf#/world" [m]
-    /world/mount              frame "mount", which is frame 1 of the boom: tilt and heave of the vehicle, and its plate
-    /world/boom/<body>        its pose (frame "<body>" in "mount") over time, and its solid; likewise /world/boom/tip
-    /world/tip_path           the tip's whole path, static in "mount", its colour the worst drive's torque / limit
-    /world/loads/<arrow>      forces at pins 6, 7 and 8, force and moment on the mount; the scale is in the view's title
-    /world/ground, vehicle    for the eye, or /world/keep_out/<shape> where the boom's file gives shapes to keep away from
-    /world/reach              what the tip reaches, as a boundary in the arm's plane, where asked for
-    /legend                   what the path's colours mean
-    /plots/<quantity>/<joint> q, qd, qdd, tau over time, in deg and m, Nm and N; /plots/q/linkage is theta3 - theta2
+    /world                    z up, the ground; frames are children of "tf#/world" [m]
+    /world/mount              frame "mount", which is frame 1 of the boom: tilt and heave of the
+                              vehicle; the mounting plate
+    /world/boom/<body>        pose of the body over time (frame "<body>" in "mount"), and its solid;
+                              also /world/boom/tip
+    /world/tip_path           path of the tip, static in "mount"; its colour is the largest torque /
+                              limit of the drives
+    /world/loads/<arrow>      forces at pins 6, 7 and 8, force and moment on the mount; the title of
+                              the view gives the scale
+    /world/ground, vehicle    for display only; or /world/keep_out/<shape>, if the boom file defines
+                              keep-out shapes
+    /world/reach              boundary of the reach in the plane of the arm, if `reach` is given
+    /legend                   meaning of the colours of the tip path
+    /plots/<quantity>/<joint> q, qd, qdd, tau over time [deg, m, Nm, N]; /plots/q/linkage is theta3
+                              - theta2
     /plots/ratio              torque / limit of each driven joint
-    /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle, which add up to tau
-    /plots/motor/<joint>      motor torque, what the torque-speed curve leaves, and that with the stepper's margin [Nm]
+    /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle terms, which
+                              add up to tau
+    /plots/motor/<joint>      motor torque, available torque, and available torque less the stepper
+                              margin [Nm]
     /plots/gearbox/<joint>    gearbox torque and its ratings [Nm]
     /plots/margin/<joint>     margins of gearbox and motor [%]
-    /plots/tip/deflection     what the drives let the tip deflect, in parts and in all [mm]
+    /plots/tip/deflection     tip deflection caused by the drives: its parts and their total [mm]
     /plots/pins               forces at the pins [N]
     /plots/mount/force, moment   of the boom on the mount, along frame 1 [N, Nm]
-    .../limits                the limits beside a plot; those that do not change with the motion at the move's two ends only
-    /plane/<joint>            the motor's torque-speed plane, and in it /now, the operating point over time
-    /drives                   the page of `drive_pictures`, where a joint has a motor
-    /checks, /assumptions, /report   as Markdown
+    .../limits                limits of a plot; constant limits are logged at the two ends of the
+                              move only
+    /plane/<joint>            torque-speed plane of the motor, with the operating point over time in
+                              .../now
+    /drives                   the page of `drive_picture`, if a joint has a motor
+    /checks, /assumptions, /report   documents in Markdown
 
     Args:
         path: the .rrd file.
-        reach: what the tip reaches, drawn as a boundary that yaws with the boom; None draws none.
+        move: the move, with its loads and its report.
+        reach: reach map to draw as a boundary that yaws with the boom; None draws no boundary.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written. An existing file is left unchanged.
     """
     boom, trajectory, loads, report = move.boom, move.trajectory, move.loads, move.full_report
     ratios = torque_ratios(boom, trajectory, loads.tau)
@@ -96,7 +107,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
             eye_of(boom, trajectory.q),
             ground_level(boom, tip),
         ),
-        legend_view("Path of the tip: torque / limit of the worst drive [-]"),
+        legend_view("Path of the tip: largest torque / limit of all drives [-]"),
         row_shares=[8, 1],
     )
 

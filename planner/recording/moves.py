@@ -1,4 +1,4 @@
-"""Several moves in one recording: a boom of lines each, and their curves in shared plots."""
+"""Recording of several moves: one stick figure for each, and their curves in shared plots."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,29 +23,32 @@ from planner.recording.torque_ratio import torque_ratios, worst_ratio
 
 
 def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: str) -> None:
-    """Writes several moves by name over each other, each in its own colour, with their blueprint.
+    """Write several moves into one recording, each in its own colour, with a blueprint.
 
-    /world/moves/<name>/<body>   its pose (frame "<name> <body>" in "mount") over time, and its links as lines
-    /world/moves/<name>/tip_path its tip's whole path
-    /plots/<quantity>/<joint>/<name>   q, qd, qdd, tau over time; the joint limits beside them in .../limits
-    /plots/ratio/<name>          torque / limit of the worst drive
-    /legend                      the moves' colours
-    /reading                     what is compared, as Markdown
+    /world/moves/<name>/<body>   pose of the body over time (frame "<name> <body>" in "mount");
+                                 links as lines
+    /world/moves/<name>/tip_path path of the tip
+    /plots/<quantity>/<joint>/<name>   q, qd, qdd, tau over time; the joint limits in .../limits
+    /plots/ratio/<name>          largest torque / limit of all drives
+    /legend                      colours of the moves
+    /reading                     description of the comparison, as Markdown
 
-    Each keeps its end pose once it is there. The mount rests: moves on a vehicle are refused.
+    A move that has ended keeps its final pose. The mount does not move, so moves on a vehicle are
+    refused.
 
     Args:
         path: the .rrd file.
-        moves: by name.
-        reading: Markdown.
+        moves: the moves by name.
+        reading: description of the comparison in Markdown.
 
     Raises:
-        InputError: no move is given, one is on a vehicle, or the file cannot be written; an old one is left as it was.
+        InputError: no move is given, a move is on a vehicle, or the file cannot be written. An
+            existing file is left unchanged.
     """
     if not moves:
-        raise InputError("no move to record")
+        raise InputError("moves is empty; give at least one move to record")
     if any(not move.vehicle.is_level for move in moves.values()):
-        raise InputError("moves on a vehicle cannot share a mount: record each by itself")
+        raise InputError("moves on a vehicle cannot share one recording; record each move separately")
     longest = max(moves.values(), key=lambda move: move.trajectory.duration)
     colors = dict(zip(moves, cycle(MOVE_COLORS), strict=False))
     legend = [*colors.items(), ("limit", LIMIT_COLOR)]
@@ -57,7 +60,8 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
 
     def log(recording: rr.RecordingStream) -> None:
         tabs: list[rrb.View | rrb.Container] = [_grid(name, tab) for name, tab in shared.items()]
-        ratio = rrb.TimeSeriesView(origin="/plots/ratio", name=f"torque / limit of the worst drive, up to {MOST_RATIO:g} [-]")
+        title = f"largest torque / limit of all drives, up to {MOST_RATIO:g} [-]"
+        ratio = rrb.TimeSeriesView(origin="/plots/ratio", name=title)
         if ratios:
             tabs.insert(0, rrb.Vertical(ratio, name="Torque / limit"))
         right = rrb.Tabs(*tabs, text("reading", "Reading"), active_tab=0)
@@ -94,14 +98,20 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
 
 
 def _grid(name: str, plots: list[Plot]) -> rrb.Grid:
-    """Without the legends of the views, which would cover the curves: one stands below the scene."""
+    """Return a tab of plots without legends, which would cover the curves.
+
+    One legend for all of them is shown below the scene.
+    """
     no_legend = rrb.PlotLegend(visible=False)
     views = [rrb.TimeSeriesView(origin=f"/{plot.entity}", name=plot.title, plot_legend=no_legend) for plot in plots]
     return rrb.Grid(*views, grid_columns=2, name=name)
 
 
 def _tabs(move: Move) -> dict[str, list[Plot]]:
-    """The plots that moves share. The drives' limits are left out: they go with each move's own speed."""
+    """Return the plots that the moves share.
+
+    The drive limits are left out: they depend on the speed of each move.
+    """
     boom, trajectory = move.boom, move.trajectory
     torques = joint_plots.torque_plots(boom, trajectory, move.loads.tau)
     return {

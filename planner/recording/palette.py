@@ -1,4 +1,4 @@
-"""Okabe and Ito's palette, which the colour-blind can tell apart, and what each colour stands for."""
+"""Okabe and Ito's palette, readable with colour blindness, and the meaning of each colour."""
 
 from dataclasses import fields
 
@@ -26,12 +26,12 @@ COLORS: dict[str, Color] = {
     "extension": BLUE,
     "end_effector": PURPLE,
 }
-"""Of the bodies. A joint's line has the colour of the body that it moves."""
+"""Colours of the bodies. The line of a joint has the colour of the body that the joint moves."""
 
 JOINT_COLORS = dict(zip(JOINTS, (COLORS[b] for b in ("base", "inner", "lower", "extension", "end_effector")), strict=True))
 PART_COLORS = dict(zip((f.name for f in fields(Breakdown)), (SKY_BLUE, GREEN, YELLOW, ORANGE, GREY, PURPLE), strict=True))
 MOVE_COLORS = (ORANGE, SKY_BLUE, GREEN, YELLOW, PURPLE, LIGHT, BLUE, GREY)
-"""Of several moves in one recording, in turn."""
+"""Colours of several moves in one recording, in this order."""
 
 LIMIT_COLOR = VERMILION
 PIN_COLOR = DARK

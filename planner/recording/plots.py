@@ -1,4 +1,4 @@
-"""Curves over time: what a view shows, and how it is logged."""
+"""Curves over time: their data, their views and how they are logged."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from planner.recording.stream import time_column
 
 @dataclass(frozen=True, eq=False)
 class Plot:
-    """One quantity of one joint in people's units, with the limits beside it."""
+    """One quantity of one joint with its limits, in degrees, metres, newtons or newton metres."""
 
     entity: str
     name: str
@@ -24,28 +24,31 @@ class Plot:
     color: Color
     values: Array
     limits: Mapping[str, float | Array]
-    """Name to value, or values (n,) where it changes with the motion; empty where no limit is known."""
+    """Limits by name: a value, or values (n,) that change with the motion.
+
+    Empty if no limit is known.
+    """
     basis: Basis
-    """Of the limits."""
+    """Basis of the limits."""
 
     @property
     def title(self) -> str:
-        """With the unit."""
+        """Name and unit of the quantity."""
         return f"{self.name} [{self.unit}]"
 
     @property
     def limit_titles(self) -> list[str]:
-        """With the unit, and what is not printed anywhere marked."""
+        """Name, unit and, if it is not printed in a source, basis of each limit."""
         mark = "" if self.basis is Basis.PRINTED else f" ({self.basis})"
         return [f"{name} [{self.unit}]{mark}" for name in self.limits]
 
     def log(self, recording: rr.RecordingStream, t: Array) -> None:
-        """The curve and its limits, at times t (n,)."""
+        """Log the curve and its limits at times t (n,)."""
         log_curves(recording, self.entity, t, [self.title], [self.color], self.values[:, None])
         self.log_limits(recording, t)
 
     def log_limits(self, recording: rr.RecordingStream, t: Array) -> None:
-        """Those that do not change with the motion are known by its two ends."""
+        """Log the limits; constant ones at the two ends of the motion only."""
         if self.limits:
             values, times = np.stack(list(self.limits.values()), axis=-1), t
             if values.ndim == 1:
@@ -56,7 +59,7 @@ class Plot:
 
     @property
     def view(self) -> rrb.TimeSeriesView:
-        """Its legend stands clear of the curve."""
+        """View of the curve, with the legend in the corner that the curve leaves free."""
         first, second = self.values[: len(self.values) // 2 + 1], self.values[len(self.values) // 2 :]
         corner = rrb.Corner2D.LeftBottom if first.min() > second.min() else rrb.Corner2D.RightBottom
         return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.title, plot_legend=corner)
@@ -74,12 +77,12 @@ class Bundle:
     """(n, curves)"""
 
     def log(self, recording: rr.RecordingStream, t: Array) -> None:
-        """The curves, at times t (n,)."""
+        """Log the curves at times t (n,)."""
         log_curves(recording, self.entity, t, self.names, self.colors, self.values)
 
     @property
     def view(self) -> rrb.TimeSeriesView:
-        """Of all the curves."""
+        """View of all the curves."""
         return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.title)
 
 
@@ -92,12 +95,15 @@ def log_curves(
     values: Array,
     style_of: Array | None = None,
 ) -> None:
-    """Curves (n, k) at times t (n,); a line through one sample would not be seen, so that is a point."""
+    """Log curves (n, k) at times t (n,).
+
+    A single sample is logged as a point, because a line through one sample is invisible.
+    """
     style = rr.SeriesLines if len(t if style_of is None else style_of) > 1 else rr.SeriesPoints
     recording.log(entity, style(names=names, colors=colors), static=True)
     recording.send_columns(entity, [time_column(t)], rr.Scalars.columns(scalars=values))
 
 
 def for_people(joint: int, values: Array) -> Array:
-    """Positions and rates of a joint in deg, or m."""
+    """Return positions or rates of a joint in degrees, or in metres for the extension."""
     return values if IS_LENGTH[joint] else np.degrees(values)

@@ -1,4 +1,4 @@
-"""A reach map as points in the arm's plane, or as a boundary beside a move."""
+"""Recording of a reach map: points in the plane of the arm, or a boundary in another scene."""
 
 from pathlib import Path
 
@@ -17,24 +17,27 @@ from planner.reports.reach_picture import margin_colors, margin_range, reach_tit
 
 
 def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> None:
-    """Writes a reach map as points in the arm's vertical plane, with the boom standing in it, and its blueprint.
+    """Write a reach map as points in the vertical plane of the arm, with the boom and a blueprint.
 
-    /world/reach/within_limits   one point a cell, its colour the torque margin
-    /world/reach/outside_limits  what the linkage reaches, but only outside the limits
-    /world/reach/scale           the colours' margins, labelled
-    /reading                     what the map stands on
+    /world/reach/within_limits   one point per cell; its colour is the torque margin
+    /world/reach/outside_limits  cells that the linkage reaches only outside the joint limits
+    /world/reach/scale           the colours with their margins
+    /reading                     description of the map and its assumptions
 
     Args:
         path: the .rrd file.
+        boom: the boom of the map.
+        reach_map: the map.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written. An existing file is left unchanged.
     """
     q, pose = reference_pose(boom)
     title = reach_title(boom, reach_map)
     reading = (
-        f"{title}\nColour of a point: the torque margin [-], by the scale beside the map; orange: above a drive's limit; small "
-        f"and grey: only outside the joint limits.\nBoom: {pose}."
+        f"{title}\nThe colour of a point is the torque margin [-]; the scale beside the map gives its values. "
+        "Orange points are above the limit of a drive. Small grey points are reached only outside the joint limits.\n"
+        f"Pose of the boom: {pose}."
     )
     x, z = np.meshgrid(reach_map.r, reach_map.z)
     cells = np.stack([x, np.zeros_like(x), z], axis=-1)
@@ -54,7 +57,10 @@ def write_reach_recording(path: str | Path, boom: Boom, reach_map: ReachMap) -> 
 
 
 def log_boundary(recording: rr.RecordingStream, reach_map: ReachMap) -> None:
-    """The boundary of what the tip reaches within the limits, in the arm's plane and yawing with it, to half a cell."""
+    """Log the boundary of the reach within the limits, to half a cell.
+
+    It lies in the plane of the arm and yaws with it.
+    """
     if not reach_map.within_limits.any():
         return
     strips = [np.stack([line[:, 0], np.zeros(len(line)), line[:, 1]], axis=-1) for line in boundary(reach_map)]
@@ -63,13 +69,17 @@ def log_boundary(recording: rr.RecordingStream, reach_map: ReachMap) -> None:
 
 
 def boundary_sentence(reach_map: ReachMap) -> str:
-    """What the boundary is, for a title."""
-    line = "grey line: reach" if reach_map.within_limits.any() else "nothing in reach"
-    return f"{line} with hold {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg"
+    """Return a description of the boundary for a title."""
+    line = "grey line: reach" if reach_map.within_limits.any() else "no point reachable"
+    return f"{line} with constraint {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg"
 
 
 def boundary(reach_map: ReachMap) -> list[Array]:
-    """Lines (k, 2) of r and z [m] half way between cells that are reached within the limits and cells that are not."""
+    """Return the boundary of the reach as lines (k, 2) of r and z [m].
+
+    The lines run half way between the cells that are reached within the limits and those that are
+    not.
+    """
     from contourpy import contour_generator
 
     def beyond(grid: Array) -> Array:
@@ -83,7 +93,7 @@ def boundary(reach_map: ReachMap) -> list[Array]:
 
 
 def _log_reach(recording: rr.RecordingStream, reach_map: ReachMap, cells: Array, half: float) -> None:
-    """The cells (m, n, 3) of a map as points of radius `half` [m], and the scale of their colours."""
+    """Log the cells (m, n, 3) of a map as points of radius `half` [m], with a colour scale."""
 
     def log(name: str, points: rr.Points3D) -> None:
         recording.log(f"world/reach/{name}", points, rr.CoordinateFrame("mount"), static=True)
@@ -101,6 +111,7 @@ def _log_reach(recording: rr.RecordingStream, reach_map: ReachMap, cells: Array,
         at = np.stack([np.full(5, reach_map.r[-1] + 0.15), np.zeros(5), height], axis=-1)
         colors = margin_colors(levels, between).astype(np.uint8)
         log("scale", rr.Points3D(at, colors=colors, radii=0.06))
-        labels = [f"margin {level:.3g}" for level in levels]  # in a colour of their own, as the scale's dark end is not legible
+        # One colour for all labels: the dark end of the scale is not legible.
+        labels = [f"margin {level:.3g}" for level in levels]
         beside = at + np.array([0.25, 0.0, 0.0])
         log("scale/labels", rr.Points3D(beside, colors=PAYLOAD_COLOR, radii=0.001, labels=labels, show_labels=True))

@@ -1,4 +1,4 @@
-"""The linkage in 3D: its bodies' solids and poses, what it stands on, and what it keeps away from."""
+"""The linkage in 3D: solids and poses of the bodies, the mount, and the keep-out shapes."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -16,27 +16,33 @@ from planner.recording.palette import COLORS, DARK, GREY, LIMIT_COLOR, OUTSIDE_C
 from planner.recording.stream import time_column
 
 POSES_AT_ONCE = 20_000
-"""Samples whose poses are in memory together; each takes some 3 kB there, and 0.5 kB in the file."""
+"""Number of samples whose poses are held in memory at a time.
 
-FOR_THE_EYE = "Ground and vehicle are drawn for the eye: the boom's file describes neither."
+A sample takes about 3 kB in memory and 0.5 kB in the file.
+"""
 
-_STEEL = 7850.0  # [kg/m^3]: the payload is shown as a ball of steel
+SURROUNDINGS_NOTE = "Ground and vehicle are drawn for display only, because the boom file does not define them."
+
+_STEEL = 7850.0  # [kg/m^3]: the payload is drawn as a steel ball
 _GROUND, _BELOW_TIP = 1.0, 0.25  # [m]
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where a boom stands among the entities and frames; the first one's frames have its bodies' bare names."""
+    """Entity and frame names of one boom.
+
+    The frames of the main boom have the bare names of its bodies.
+    """
 
     entity: str = "world/boom"
     prefix: str = ""
 
     def of(self, body: str) -> str:
-        """The entity of a body."""
+        """Return the entity of a body."""
         return f"{self.entity}/{body}"
 
     def frame(self, body: str) -> str:
-        """The frame of a body."""
+        """Return the frame of a body."""
         return f"{self.prefix}{body}"
 
 
@@ -45,7 +51,7 @@ PLANNED = Place("world/planned", "planned ")
 
 
 def log_mount(recording: rr.RecordingStream, t: Array, vehicle: VehicleCase | None) -> None:
-    """Frame "mount", which is frame 1 of the boom, with its plate, as the vehicle tilts and heaves it."""
+    """Log the frame "mount" (frame 1 of the boom) with its plate, moving with the vehicle."""
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     plate = boxes(np.array([[-0.2, -0.2, -0.02]]), np.array([[0.2, 0.2, 0.0]]), PIN_COLOR)
     recording.log("world/mount", plate, rr.CoordinateFrame("mount"), static=True)
@@ -54,7 +60,7 @@ def log_mount(recording: rr.RecordingStream, t: Array, vehicle: VehicleCase | No
 
 
 def log_motion(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, place: Place = BOOM) -> None:
-    """The pose of every body and of the tip in "mount", at times t (n,) [s] of positions q (n, 5)."""
+    """Log the poses of all bodies and of the tip in "mount", for t (n,) [s] and q (n, 5)."""
     for start in range(0, len(t), POSES_AT_ONCE):
         part = slice(start, start + POSES_AT_ONCE)
         for name, T in body_transforms(boom, q[part]).items():
@@ -72,20 +78,20 @@ def _log_poses(recording: rr.RecordingStream, entity: str, T: Array, parent: str
 
 
 def log_path(recording: rr.RecordingStream, entity: str, positions: Array, color: Color) -> None:
-    """A path of the tip (n, 3) [m] in "mount", in one colour."""
+    """Log a path of the tip (n, 3) [m] in "mount", in one colour."""
     strip = rr.LineStrips3D([positions], colors=[color], radii=[0.004])
     recording.log(entity, strip, rr.CoordinateFrame("mount"), static=True)
 
 
 def log_solids(recording: rr.RecordingStream, boom: Boom, *, without: str | None = None) -> None:
-    """The solids of the boom: links but the one `without`, pins, payload."""
+    """Log the solids of the boom: links except `without`, pins and payload."""
     for name, bars in _bars(boom).items():
         if name == without:
             continue
         _log_bars(recording, BOOM, name, bars, COLORS[name], "solid")
     for name, along in _pins(boom).items():
         centers = np.array([(e, 0.0, 0.0) for e in along]) @ R_LINK_BODY[name]
-        # A cylinder lies along z, and these bodies' z is the pins' direction n.
+        # A Rerun cylinder lies along z, and z of these bodies is the direction n of the pins.
         pins = rr.Cylinders3D(centers=centers, lengths=0.16, radii=0.018, colors=PIN_COLOR, fill_mode="solid")
         recording.log(BOOM.of(f"{name}/pins"), pins, rr.CoordinateFrame(name), static=True)
     if boom.payload.mass > 0.0:
@@ -95,13 +101,13 @@ def log_solids(recording: rr.RecordingStream, boom: Boom, *, without: str | None
 
 
 def log_edges(recording: rr.RecordingStream, boom: Boom, place: Place, color: Color = LIMIT_COLOR) -> None:
-    """The links' edges alone, of a boom beside another."""
+    """Log the edges of the links only, for a boom shown together with another."""
     for name, bars in _bars(boom).items():
         _log_bars(recording, place, name, bars, color, "majorwireframe")
 
 
 def log_sticks(recording: rr.RecordingStream, boom: Boom, place: Place, color: Color) -> None:
-    """The links as lines in one colour, of a boom among others."""
+    """Log the links as lines in one colour, for a boom among others."""
     for name, bars in _bars(boom).items():
         R = R_LINK_BODY[name]
         lines = [np.array([(bar.e[0], p, 0.0), (bar.e[1], p, 0.0)]) @ R for bar in bars for p in (sum(bar.p) / 2.0,)]
@@ -113,17 +119,23 @@ def log_sticks(recording: rr.RecordingStream, boom: Boom, place: Place, color: C
 
 
 def ground_level(boom: Boom, tip: Array) -> float:
-    """Height [m] at which ground is drawn where the boom's file gives none: below all positions (n, 3) of the tip."""
+    """Return the height [m] of the ground drawn where the boom file defines no keep-out shapes.
+
+    It is below all tip positions (n, 3).
+    """
     return 0.0 if boom.keep_out is not None else min(-_GROUND, float(tip[:, 2].min()) - _BELOW_TIP)
 
 
 def log_surroundings(recording: rr.RecordingStream, boom: Boom, tip: Array) -> None:
-    """The shapes to keep away from; where none are given, ground and vehicle for the eye, below all positions of the tip."""
+    """Log the keep-out shapes.
+
+    Without any, log a ground and a vehicle for display, the ground below all tip positions.
+    """
     if boom.keep_out is not None:
         _log_keep_out(recording, boom.keep_out)
         return
     ground = ground_level(boom, tip)
-    label = "drawn for the eye"
+    label = "for display only"
     plane = rr.Boxes3D(
         centers=[(0.0, 0.0, ground - 0.01)], half_sizes=[(3.0, 3.0, 0.01)], colors=[(*DARK, 60)], fill_mode="solid",
         labels=[f"ground, {label}"], show_labels=False,
@@ -138,7 +150,7 @@ def log_surroundings(recording: rr.RecordingStream, boom: Boom, tip: Array) -> N
 
 
 def _log_keep_out(recording: rr.RecordingStream, keep_out: KeepOut) -> None:
-    """The shapes that the arm keeps away from, as the mount carries them."""
+    """Log the keep-out shapes, fixed to the mount."""
     look: dict[str, Any] = {"colors": [OUTSIDE_COLOR], "fill_mode": "majorwireframe"}
     for shape in keep_out.shapes:
         entity = rr.new_entity_path(["world", "keep_out", shape.name])
@@ -159,13 +171,17 @@ def _log_keep_out(recording: rr.RecordingStream, keep_out: KeepOut) -> None:
 
 
 def boxes(low: Array, high: Array, color: Color, fill: Literal["solid", "majorwireframe"] = "solid") -> rr.Boxes3D:
-    """Boxes between opposite corners, (boxes, 3) each."""
+    """Return boxes between opposite corners, (boxes, 3) each."""
     return rr.Boxes3D(centers=(low + high) / 2.0, half_sizes=np.abs(high - low) / 2.0, colors=color, fill_mode=fill)
 
 
 @dataclass(frozen=True)
 class _Bar:
-    """A box in a link's axes (e, p, n): from e[0] to e[1] along the link, p[0] to p[1] across it, depth along the pins [m]."""
+    """A box along the link axes (e, p, n).
+
+    It runs from e[0] to e[1] along the link, from p[0] to p[1] across it, and over `depth` along
+    the pins [m].
+    """
 
     e: tuple[float, float]
     p: tuple[float, float]
@@ -191,7 +207,11 @@ def _log_bars(
 
 
 def _bars(boom: Boom) -> dict[str, list[_Bar]]:
-    """The solids of every body. The extension is a rod: `grip` of it shows when retracted, and stays inside at full stroke."""
+    """Return the solids of every body.
+
+    The extension is a rod. A length `grip` of it is visible when it is retracted, and the same
+    length stays inside at full stroke.
+    """
     g, grip = boom.geometry, 0.05
     rod = max(float(boom.limits.upper[3]) + 2.0 * grip, g.L7)
     return {
@@ -209,5 +229,5 @@ def _bars(boom: Boom) -> dict[str, list[_Bar]]:
 
 
 def _pins(boom: Boom) -> dict[str, tuple[float, ...]]:
-    """How far along its link each pin sits [m]: shoulder and 6, 8 and 7, wrist."""
+    """Return the position of each pin along its link [m]: shoulder and 6, 8 and 7, wrist."""
     return {"lower": (0.0, boom.geometry.L3), "upper": (0.0, boom.geometry.L5), "end_effector": (0.0,)}

@@ -1,4 +1,4 @@
-"""From logged entities to a file."""
+"""Writing logged entities to a file."""
 
 import uuid
 from collections.abc import Callable
@@ -12,38 +12,39 @@ from planner.files import replacing
 
 
 def save(path: str | Path, name: str, log: Callable[[rr.RecordingStream], None]) -> None:
-    """Writes the recording of that name, with what `log` puts in.
+    """Write the recording of that name with the content that `log` adds.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written. An existing file is left unchanged.
     """
     with replacing(path) as temporary:
         Path(temporary).write_bytes(_encoded(name, log))
 
 
 def time_column(t: Array) -> rr.TimeColumn:
-    """Times (n,) [s] on the timeline "t"."""
+    """Return times (n,) [s] on the timeline "t"."""
     return rr.TimeColumn("t", duration=np.rint(t * 1e9).astype("timedelta64[ns]"))
 
 
 def log_markdown(recording: rr.RecordingStream, entity: str, text: str) -> None:
-    """A text that does not change."""
+    """Log a static Markdown document."""
     recording.log(entity, rr.TextDocument(text, media_type="text/markdown"), static=True)
 
 
 def log_png(recording: rr.RecordingStream, entity: str, png: bytes) -> None:
-    """A picture that does not change."""
+    """Log a static picture."""
     recording.log(entity, rr.EncodedImage(contents=png, media_type="image/png"), static=True)
 
 
 def _encoded(name: str, log: Callable[[rr.RecordingStream], None]) -> bytes:
-    """The whole .rrd.
+    """Return the whole .rrd file.
 
-    It is put together in memory: once a write fails, as on a full disk, Rerun's own file sink (0.41) waits for ever. Each
-    recording has an id of its own, as the viewer would merge two that share one.
+    It is built in memory, because Rerun's own file sink (0.41) waits for ever once a write fails,
+    for example on a full disk. Each recording has its own id, because the viewer merges recordings
+    with equal ids.
     """
     strict = rr.strict_mode()
-    rr.set_strict_mode(True)  # a misuse of Rerun raises, and is not a line in a log
+    rr.set_strict_mode(True)  # a misuse of Rerun raises an exception instead of writing a log message
     try:
         with rr.RecordingStream("boom", recording_id=uuid.uuid4()) as recording:
             memory = recording.memory_recording()

@@ -1,4 +1,4 @@
-"""How near each drive is to its limit along a motion, the path of the tip coloured by it, and what the colours mean."""
+"""Torque / limit of each drive along a motion, and the tip path coloured by it."""
 
 import numpy as np
 import rerun as rr
@@ -20,14 +20,21 @@ BANDS: tuple[tuple[float, str, Color], ...] = (
     (1.0 + SAMPLING_SLACK, "0.8 to 1", ORANGE),
     (np.inf, "over the limit", VERMILION),
 )
-"""Upper bound, name and colour of each band of torque / limit; at the limit is not yet over it."""
+"""Upper bound, name and colour of each band of torque / limit.
 
-UNKNOWN: tuple[str, Color] = ("no drive's limit is known", LIGHT)
+A demand at its limit is not above it.
+"""
+
+UNKNOWN: tuple[str, Color] = ("no drive limit is known", LIGHT)
 
 
 def torque_ratios(boom: Boom, trajectory: Trajectory, tau: Array) -> dict[str, Array]:
-    """Torque / limit (n,) of each driven joint: the larger of gearbox torque over its start-stop torque and motor torque over
-    what its curve leaves at that speed, as the planner holds them; the extension's force over its actuator's peak force."""
+    """Return torque / limit (n,) of each driven joint.
+
+    For a drive it is the larger of two ratios: gearbox torque over start-stop torque, and motor
+    torque over the torque-speed limit at that speed, as the planner computes them. For the
+    extension it is the force over the peak force of the actuator.
+    """
     ratios = load_ratio(boom, tau, trajectory.qd, trajectory.qdd)
     found = {
         joint: ratios[:, i]
@@ -40,14 +47,15 @@ def torque_ratios(boom: Boom, trajectory: Trajectory, tau: Array) -> dict[str, A
 
 
 def worst_ratio(ratios: dict[str, Array]) -> Array | None:
-    """The largest of the ratios (n,); None where no drive's limit is known."""
+    """Return the largest of the ratios (n,); None where no drive limit is known."""
     return np.max(list(ratios.values()), axis=0) if ratios else None
 
 
 def log_tip_path(recording: rr.RecordingStream, positions: Array, worst: Array | None) -> None:
-    """The tip's path (n, 3) [m] in "mount", each piece between two samples in the band of the worse of their ratios (n,).
+    """Log the tip path (n, 3) [m] in "mount", coloured by the ratios `worst` (n,).
 
-    Neighbours of one band share a strip.
+    A segment between two samples has the colour of the larger of their ratios. Neighbouring
+    segments of one band form one strip.
     """
     if worst is None:
         strips, colors = [positions], [UNKNOWN[1]]
@@ -63,5 +71,5 @@ def log_tip_path(recording: rr.RecordingStream, positions: Array, worst: Array |
 
 
 def legend(known: bool) -> Legend:
-    """Name and colour of every band, or what stands for them where no drive's limit is known."""
+    """Return name and colour of every band, or of UNKNOWN if no drive limit is known."""
     return [(name, color) for _, name, color in BANDS] if known else [UNKNOWN]

@@ -1,4 +1,4 @@
-"""Each motor's torque-speed plane, with the operating point moving in it."""
+"""Torque-speed plane of each motor with the operating point moving in it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, OUTSIDE_COLOR, 
 from planner.recording.stream import time_column
 
 WIDTH = 1.6
-"""Of a plane whose height is 1; y points down."""
+"""Width of a plane whose height is 1; y points down."""
 
 _RPM = 30.0 / np.pi
 _TICKS = 5
@@ -23,39 +23,39 @@ _TICKS = 5
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """The operating points of a motor, and the curve that bounds them."""
+    """The operating points of a motor, and the curve that limits them."""
 
     entity: str
     title: str
     color: Color
     speed: Array
-    """(n,) size [rad/s]"""
+    """(n,) absolute motor speed [rad/s]"""
     torque: Array
-    """(n,) size [Nm]"""
+    """(n,) absolute motor torque [Nm]"""
     curve_speed: Array
     curve: Array
     basis: Basis
-    """Of the curve."""
+    """Basis of the curve."""
 
     @property
     def most(self) -> Array:
-        """Speed [rad/s] and torque [Nm] at the plane's far corner."""
+        """Speed [rad/s] and torque [Nm] at the far corner of the plane."""
         return np.array([self.curve_speed[-1], 1.08 * max(self.curve.max(), self.torque.max())])
 
     def points(self, speed: Array, torque: Array) -> Array:
-        """Where they stand in the plane, (n, 2)."""
+        """Return the coordinates (n, 2) of speeds [rad/s] and torques [Nm] in the plane."""
         x, y = np.stack([speed, torque], axis=-1).T / self.most[:, None]
         return np.stack([WIDTH * x, 1.0 - y], axis=-1)
 
     @property
     def view(self) -> rrb.Spatial2DView:
-        """With room for the ticks' labels."""
+        """View of the plane, with room for the labels of the ticks."""
         bounds = rrb.VisualBounds2D(x_range=(-0.2, WIDTH + 0.1), y_range=(-0.1, 1.2))
         return rrb.Spatial2DView(origin=f"/{self.entity}", name=self.title, visual_bounds=bounds)
 
 
 def planes(move: Move) -> Iterator[Plane]:
-    """The plane of each motor whose curve and torque are known."""
+    """Yield the plane of each motor whose curve and torque are known."""
     motion = move.trajectory
     for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
         if drive is None:
@@ -66,7 +66,7 @@ def planes(move: Move) -> Iterator[Plane]:
         if curve is None or torque is None:
             continue
         basis = Basis.weakest([Basis.ESTIMATED, *(origin.basis for origin in drive.supply_origins)])
-        title = f"{joint}, {drive.motor.name}: motor torque [Nm] over speed [rpm], in size{_supply(drive)}"
+        title = f"{joint}, {drive.motor.name}: absolute motor torque [Nm] over speed [rpm]{_supply(drive)}"
         yield Plane(f"plane/{joint}", title, JOINT_COLORS[joint], speed, np.abs(torque), w, curve, basis)
 
 
@@ -77,7 +77,7 @@ def _supply(drive: Drive) -> str:
 
 
 def log_plane(recording: rr.RecordingStream, t: Array, plane: Plane) -> None:
-    """The curve, the curve with its margin, the whole motion, and the operating point over time."""
+    """Log the curve, the curve less its margin, the motion, and the operating point over time."""
 
     def line(name: str, points: Array, color: Color, width: float, label: str | None = None) -> None:
         look = rr.LineStrips2D([points], colors=[color], radii=rr.Radius.ui_points(width))
@@ -109,6 +109,6 @@ def _text(recording: rr.RecordingStream, entity: str, at: Array, text: str) -> N
 
 
 def _step(most: float) -> float:
-    """1, 2 or 5 times a power of ten, that divides `most` into some _TICKS."""
+    """Return 1, 2 or 5 times a power of ten that divides `most` into about _TICKS intervals."""
     power = 10.0 ** np.floor(np.log10(most / _TICKS))
     return float(next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= most / _TICKS))

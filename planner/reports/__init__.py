@@ -1,0 +1,1 @@
+"""Reports of motions: summaries, documents, tables and pictures."""

@@ -1,4 +1,8 @@
-"""A report as a document to keep: Markdown, HTML or PDF, with its pictures, the versions and the command that made it."""
+"""Documents of reports in Markdown, HTML or PDF.
+
+A document contains the report, its pictures, the versions of the libraries, and the command that
+made it.
+"""
 
 import io
 import shlex
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
 FORMS = (".md", ".html", ".pdf")
 _TEXT = 8  # [pt]
 _PADDING = 0.6  # [mm]
-_WITH_HEADING = 25.0  # [mm], what stands on the page of a heading at least
+_WITH_HEADING = 25.0  # [mm], least space below a heading on its page
 _LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "control")
 _STYLE = (
     "body{font-family:sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
@@ -32,36 +36,38 @@ _STYLE = (
 
 
 def require_form(path: str) -> None:
-    """Whether a document can have that name.
+    """Check that the name ends in one of FORMS.
 
     Raises:
-        InputError: its ending is none of FORMS.
+        InputError: the name has another ending.
     """
     if Path(path).suffix not in FORMS:
         raise InputError(f"{path}: a report is written as {', '.join(FORMS)}")
 
 
 def command_line() -> str:
-    """The command that is running, as it would be typed."""
+    """Return the running command as it would be typed."""
     return shlex.join(["boom", *sys.argv[1:]])
 
 
 def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figure"]) -> None:
-    """Writes a report with its pictures by title, the command line and the versions behind it.
+    """Write a report with its pictures by title, the command line and the library versions.
 
-    HTML and PDF hold their pictures; those of Markdown lie beside it as FILE-1.png, FILE-2.png and so on.
+    HTML and PDF files contain their pictures. A Markdown file refers to pictures beside it, named
+    FILE-1.png, FILE-2.png and so on.
 
     Raises:
-        InputError: the ending is unknown, or a file cannot be written; an old one is left as it was.
+        InputError: the ending is unknown, or a file cannot be written. An existing file is left
+            unchanged.
     """
     require_form(str(path))
     path = Path(path)
     drawn = {title: _png(figure) for title, figure in pictures.items()}
     made = f"Made by `{command_line()}` with {', '.join(_versions())}, Python {sys.version.split()[0]}."
-    with ExitStack() as moved:  # every file is whole before the first takes its place
+    with ExitStack() as stack:  # all files are complete before the first is moved into place
 
         def write(place: Path, data: bytes) -> None:
-            Path(moved.enter_context(replacing(place))).write_bytes(data)
+            Path(stack.enter_context(replacing(place))).write_bytes(data)
 
         if path.suffix == ".md":
             content = f"{markdown.rstrip()}\n"
@@ -98,7 +104,7 @@ def _html(title: str, markdown: str, drawn: Mapping[str, bytes], made: str) -> s
 
 
 def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str) -> bytes:
-    """Headings, paragraphs, lists and tables set one after the other, then a page for each picture."""
+    """Return a PDF: headings, paragraphs, lists and tables, then a page for each picture."""
     from fpdf import FPDF
     from markdown_it import MarkdownIt
     from markdown_it.tree import SyntaxTreeNode
@@ -133,13 +139,16 @@ def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str) -> bytes:
 
 
 def _set_table(pdf: "FPDF", rows: list[list[str]]) -> None:
-    """A table no wider than the page: every column holds its longest word, and only the widest have to break their text."""
+    """Set a table no wider than the page.
+
+    Every column is wide enough for its longest word; only the widest columns wrap their text.
+    """
     size = float(_TEXT - 1)
-    pdf.set_font("helvetica", "B", size)  # the header's, in which words are widest
-    around = 2.0 * _PADDING + 0.5
+    pdf.set_font("helvetica", "B", size)  # words are widest in the header's font
+    padding = 2.0 * _PADDING + 0.5
 
     def widest(texts: Iterable[str]) -> float:
-        return max(map(pdf.get_string_width, texts), default=0.0) + around
+        return max(map(pdf.get_string_width, texts), default=0.0) + padding
 
     columns = list(zip(*rows, strict=True))
     least = [widest(word for cell in column for word in cell.split()) for column in columns]
@@ -161,20 +170,23 @@ def _set_table(pdf: "FPDF", rows: list[list[str]]) -> None:
     pdf.ln(2)
 
 
-def _capped(least: list[float], whole: list[float], room: float) -> list[float]:
-    """The whole widths, those beyond a common cap cut down to it but to no less than the least, so that all fit the room."""
+def _capped(least: list[float], whole: list[float], available: float) -> list[float]:
+    """Return the full widths, cut to a common cap so that their sum is at most `available`.
+
+    No width is cut below its value in `least`.
+    """
     low, high = 0.0, max(whole)
-    if sum(whole) <= room:
+    if sum(whole) <= available:
         return whole
     for _ in range(40):
         cap = (low + high) / 2.0
-        fits = sum(max(few, min(all_, cap)) for few, all_ in zip(least, whole, strict=True)) <= room
+        fits = sum(max(few, min(all_, cap)) for few, all_ in zip(least, whole, strict=True)) <= available
         low, high = (cap, high) if fits else (low, cap)
     return [max(few, min(all_, low)) for few, all_ in zip(least, whole, strict=True)]
 
 
 def _text(node: "SyntaxTreeNode") -> str:
-    """A node's text in the characters of a PDF's own fonts."""
+    """Return the text of a node in the characters of the fonts built into PDF."""
     if not node.children:
         return str(node.content).encode("latin-1", "replace").decode("latin-1")
     return "".join(_text(child) for child in node.children)

@@ -1,4 +1,4 @@
-"""The drives' page: torque-speed plane, gearbox torque and margins of each motor, and the tip's budget, as a picture."""
+"""Page of the drives: torque-speed planes, gearbox torques, margins, and the tip error budget."""
 
 from collections.abc import Sequence
 from io import BytesIO
@@ -21,33 +21,34 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-COLORS = {  # Okabe and Ito's, which the colour-blind can tell apart
+COLORS = {  # Okabe and Ito's palette, readable with colour blindness
     Verdict.PASS: "#009e73",
     Verdict.WARN: "#e69f00",
     Verdict.FAIL: "#d55e00",
     Verdict.INFO: "#999999",
 }
-_THERE, _BACK, _CURVE = "#0072b2", "#56b4e9", "#000000"
+_FORWARD, _REVERSED, _CURVE = "#0072b2", "#56b4e9", "#000000"
 _LONGEST_BAR = 3.0
 _WIDTHS = (1.0, 1.0, 0.22, 0.9)
-"""Of the three panels; the names of the bars stand in the third column."""
+"""Relative widths of the three panels. The third column holds the names of the bars."""
 _RPM = 30.0 / np.pi
 
 
 def write_drive_picture(
     path: str | Path, boom: Boom, trajectory: Trajectory, tau: Array, report: Report, parts: Sequence[slice] = ()
 ) -> None:
-    """Writes `drive_picture` as a file.
+    """Write `drive_picture` to a file.
 
     Raises:
-        InputError: no joint has a motor, or the file cannot be written; an old one is left as it was.
+        InputError: no joint has a motor, or the file cannot be written. An existing file is left
+            unchanged.
     """
     with replacing(path) as temporary:
         Path(temporary).write_bytes(drive_picture(boom, trajectory, tau, report, parts))
 
 
 def drive_picture(boom: Boom, trajectory: Trajectory, tau: Array, report: Report, parts: Sequence[slice] = ()) -> bytes:
-    """`drive_figure` as a PNG.
+    """Return `drive_figure` as a PNG.
 
     Raises:
         InputError: no joint has a motor.
@@ -58,15 +59,19 @@ def drive_picture(boom: Boom, trajectory: Trajectory, tau: Array, report: Report
 
 
 def drive_figure(boom: Boom, trajectory: Trajectory, tau: Array, report: Report, parts: Sequence[slice] = ()) -> "Figure":
-    """A figure with a row of three panels for each joint that has a motor.
+    """Return a figure with a row of three panels for each joint that has a motor.
 
-    Left the motor's torque-speed plane with the motion in it, there and, where it can be run so, back; in the middle the
-    gearbox's torque over time beside its ratings; right the margins of the joint's checks. Below, the tip's error budget.
+    The left panel shows the torque-speed plane of the motor with the motion, and with the reversed
+    motion if the checks include it. The middle panel shows the gearbox torque over time with its
+    ratings. The right panel shows the margins of the joint's checks. The bottom row shows the error
+    budget of the tip.
 
     Args:
-        tau: (n, 5) the motion's torques.
-        report: of the motion.
-        parts: the samples of each part to show, end to end; none given shows the whole motion.
+        boom: the boom.
+        trajectory: the motion.
+        tau: (n, 5) torques of the motion.
+        report: report of the motion.
+        parts: samples of each part to show, one after the other; empty shows the whole motion.
 
     Raises:
         InputError: no joint has a motor.
@@ -92,7 +97,11 @@ def drive_figure(boom: Boom, trajectory: Trajectory, tau: Array, report: Report,
 def drive_pages(
     boom: Boom, trajectory: Trajectory, tau: Array, report: Report, parts: Sequence[slice] = ()
 ) -> dict[str, "Figure"]:
-    """The same as a figure for each joint that has a motor, and one for the tip, by title; none where no joint has one."""
+    """Return the panels of `drive_figure` as separate figures by title.
+
+    There is one figure for each joint that has a motor, and one for the tip. The result is empty if
+    no joint has a motor.
+    """
     shown, driven = list(parts) or [slice(0, len(trajectory.t))], _driven(boom)
     pages = {}
     for i, drive in driven:
@@ -139,7 +148,7 @@ def _drive(
 
 def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: Array, rows: Sequence[Row]) -> None:
     speed = drive.gearbox.ratio * np.abs(qd)
-    for sign, color, name in ((1.0, _THERE, "the motion"), (-1.0, _BACK, "the same backwards")):
+    for sign, color, name in ((1.0, _FORWARD, "motion"), (-1.0, _REVERSED, "motion reversed")):
         if sign < 0.0 and not any(row.kind is CheckKind.MOTOR_TORQUE_REVERSED for row in rows):
             continue
         torque = motor_torque(drive, tau, sign * qd, qdd)
@@ -160,8 +169,8 @@ def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: A
         axes.plot(w * _RPM, curve, color=_CURVE, label=f"available (estimated{supply})")
         axes.plot(w * _RPM, curve / (1.0 + STEPPER_MARGIN), "--", color=_CURVE, label=f"with {STEPPER_MARGIN:.0%} margin")
     elif running is not None:
-        axes.axhline(running, color=_CURVE, linestyle=":", label="running torque; the curve needs voltage and wiring")
-    axes.set(title=f"{joint}: {drive.motor.name}", xlabel="motor speed [rpm]", ylabel="motor torque, size [Nm]")
+        axes.axhline(running, color=_CURVE, linestyle=":", label="running torque (the curve needs voltage and wiring)")
+    axes.set(title=f"{joint}: {drive.motor.name}", xlabel="motor speed [rpm]", ylabel="absolute motor torque [Nm]")
     axes.set_xlim(0.0, fastest * _RPM)
     axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.25)
@@ -169,7 +178,7 @@ def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: A
 
 
 def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts: Sequence[slice], rows: Sequence[Row]) -> None:
-    _over_time(axes, t, np.abs(tau)[:, None], parts, ["torque, size"], [_THERE])
+    _over_time(axes, t, np.abs(tau)[:, None], parts, ["absolute torque"], [_FORWARD])
     gear = drive.gearbox
     ratings = (
         ("rated", gear.continuous_torque, COLORS[Verdict.PASS]),
@@ -182,20 +191,20 @@ def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts
     average = next((row.demand for row in rows if row.kind is CheckKind.GEARBOX_AVERAGE), None)
     if average is not None:
         axes.axhline(average, color=_CURVE, linestyle="--", label=f"average of the cycle {average:.0f} Nm")
-    axes.set(title=f"{joint}: {gear.name}", ylabel="gearbox torque, size [Nm]")
+    axes.set(title=f"{joint}: {gear.name}", ylabel="absolute gearbox torque [Nm]")
     axes.set_ylim(bottom=0.0)
     _legend_below(axes, 2)
 
 
 def _tip(axes: "Axes", boom: Boom, trajectory: Trajectory, tau: Array, parts: Sequence[slice]) -> None:
-    """The error budget of the tip, its parts and their sum, over time."""
+    """Draw the error budget of the tip over time: its parts and their sum."""
     budget = tip_deflection(boom, trajectory.q, tau)
     values = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
-    names = ["wind-up, size", "hysteresis", "backlash", "step error", "in all"]
-    colors = [_THERE, COLORS[Verdict.WARN], COLORS[Verdict.PASS], "#cc79a7", _CURVE]
+    names = ["wind-up", "hysteresis", "backlash", "step error", "total"]
+    colors = [_FORWARD, COLORS[Verdict.WARN], COLORS[Verdict.PASS], "#cc79a7", _CURVE]
     _over_time(axes, trajectory.t, np.stack(values, axis=-1) * 1e3, parts, names, colors)
-    without = " (a joint without a drive adds nothing here)" if budget.uncounted else ""
-    axes.set(title=f"tip: what the drives let it deflect{without}", ylabel="deflection, at most [mm]")
+    missing = " (parts without data are left out)" if budget.uncounted else ""
+    axes.set(title=f"tip deflection caused by the drives{missing}", ylabel="largest deflection [mm]")
     axes.set_ylim(bottom=0.0)
     _legend_below(axes, 5, gap=0.17)
 
@@ -203,7 +212,7 @@ def _tip(axes: "Axes", boom: Boom, trajectory: Trajectory, tau: Array, parts: Se
 def _over_time(
     axes: "Axes", t: Array, values: Array, parts: Sequence[slice], names: Sequence[str], colors: Sequence[str]
 ) -> None:
-    """Curves (n, k) over the time of the parts, end to end."""
+    """Draw curves (n, k) over the time of the parts, one after the other."""
     begin = 0.0
     for k, part in enumerate(parts):
         local = t[part] - t[part][0]
@@ -212,12 +221,15 @@ def _over_time(
         begin += float(local[-1])
         if k + 1 < len(parts):
             axes.axvline(begin, color="#cccccc", linewidth=0.8)
-    axes.set_xlabel("the different moves, end to end [s]" if len(parts) > 1 else "time [s]")
+    axes.set_xlabel("time, one move after the other [s]" if len(parts) > 1 else "time [s]")
     axes.grid(alpha=0.25)
 
 
 def _margins(axes: "Axes", joint: str, rows: Sequence[Row]) -> None:
-    """A bar a row, as long as its margin and cut off at _LONGEST_BAR; a tick stands at the required one."""
+    """Draw a bar per row with a tick at the required margin.
+
+    Its length is the margin, up to _LONGEST_BAR.
+    """
     from matplotlib.patches import Patch
 
     shown = [row for row in rows if row.margin is not None or row.verdict is Verdict.NOT_CHECKABLE]
@@ -236,14 +248,14 @@ def _margins(axes: "Axes", joint: str, rows: Sequence[Row]) -> None:
     axes.axvline(0.0, color=_CURVE, linewidth=0.8)
     axes.set_xlim(-1.05, _LONGEST_BAR + 0.6)
     axes.set_xticks([-1.0, 0.0, 1.0, 2.0, 3.0], ["-100%", "0", "100%", "200%", "300%"])
-    axes.set(title=f"{joint}: margins", xlabel="(limit - demand) / demand; a stroke is what is required")
+    axes.set(title=f"{joint}: margins", xlabel="(limit - demand) / demand; a black tick is the required margin")
     legend = [Patch(facecolor=color, label=str(verdict)) for verdict, color in COLORS.items()]
     _legend_below(axes, 4, legend)
     axes.grid(axis="x", alpha=0.25)
 
 
 def _legend_below(axes: "Axes", columns: int, handles: "Sequence[Patch] | None" = None, gap: float = 0.09) -> None:
-    """Clear of the curves."""
+    """Place the legend below the axes, clear of the curves."""
     place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -gap), "frameon": False}
     style: dict[str, Any] = {"fontsize": 8, "markerscale": 4, "ncols": columns}
     if handles is None:

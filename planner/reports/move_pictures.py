@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_VALUE, _LIMIT = "#0072b2", "#d55e00"  # Okabe and Ito's blue and vermilion, which the colour-blind can tell apart
+_VALUE, _LIMIT = "#0072b2", "#d55e00"  # Okabe and Ito's blue and vermilion, readable with colour blindness
 
 
 def move_pictures(boom: Boom, motion: Trajectory, tau: Array) -> dict[str, "Figure"]:
-    """A matplotlib figure for each quantity of a motion with joint torques `tau` (n, 5), by title."""
+    """Return a figure by title for each quantity of a motion with torques `tau` (n, 5)."""
     limits = boom.limits
     return {
         "Positions": _figure(motion, "position", "", motion.q, limits.lower, limits.upper),
@@ -67,7 +67,7 @@ def _draw(panels: list["Axes"], motion: Trajectory, name: str, per: str, values:
 
 
 def _draw_torques(panels: list["Axes"], boom: Boom, motion: Trajectory, tau: Array) -> None:
-    """Torque of each joint with what its drive leaves for it at that time, -T - J qdd to T - J qdd."""
+    """Draw the torque of each joint with the limits of its drive, -T - J qdd and T - J qdd."""
     for i, (joint, axes) in enumerate(zip(JOINTS, panels, strict=True)):
         axes.plot(motion.t, tau[:, i], color=_VALUE)
         drive = boom.drives[i]

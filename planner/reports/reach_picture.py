@@ -1,4 +1,4 @@
-"""The reach of the arm's vertical plane as a picture."""
+"""Picture of the reach in the vertical plane of the arm."""
 
 from pathlib import Path
 
@@ -11,23 +11,25 @@ from boom_model.kinematics.reach import ReachMap
 from planner.files import replacing
 
 OVERLOADED = (213, 94, 0)
-"""Colour of a negative margin, above a drive's limit."""
+"""Colour of a negative margin: above the limit of a drive."""
 OUTSIDE_LIMITS = (222, 222, 222)
 MARGIN_UNKNOWN = (204, 121, 167)
-"""Colour of what is reached by a boom without drives."""
-_COLORMAP = "viridis"  # the colour-blind can read it, and none of it is the grey of OUTSIDE_LIMITS
+"""Colour of cells reached by a boom without drives."""
+_COLORMAP = "viridis"  # readable with colour blindness, and without the grey of OUTSIDE_LIMITS
 
 
 def write_reach_picture(path: str | Path, boom: Boom, reach_map: ReachMap, title: str, *, show_boom: bool = True) -> None:
-    """Writes a PNG of a reach map: the torque margin as colour, with the boom at its reference pose.
+    """Write a PNG of a reach map: the torque margin as colour, with the boom at its reference pose.
 
     Args:
         path: the .png file.
-        title: above it; `reach_title` says what the map stands on.
-        show_boom: draws the links at `reference_pose`, for scale.
+        boom: the boom of the map.
+        reach_map: the map.
+        title: title of the picture; `reach_title` gives the assumptions of the map.
+        show_boom: whether to draw the links at `reference_pose`, for scale.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written. An existing file is left unchanged.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.cm import ScalarMappable
@@ -43,7 +45,7 @@ def write_reach_picture(path: str | Path, boom: Boom, reach_map: ReachMap, title
     axes.pcolormesh(_edges(reach_map.r), _edges(reach_map.z), _cell_colors(reach_map), rasterized=True)
     legend: list[Patch | Line2D] = []
     for name, color, shown in (
-        ("reached, margin unknown (no drives)", MARGIN_UNKNOWN, reach_map.within_limits & np.isnan(reach_map.torque_margin)),
+        ("reached; margin unknown (no drives)", MARGIN_UNKNOWN, reach_map.within_limits & np.isnan(reach_map.torque_margin)),
         ("above a drive's limit", OVERLOADED, reach_map.torque_margin < 0.0),
         ("only outside the joint limits", OUTSIDE_LIMITS, reach_map.exists & ~reach_map.within_limits),
     ):
@@ -71,15 +73,19 @@ def write_reach_picture(path: str | Path, boom: Boom, reach_map: ReachMap, title
 
 
 def reach_title(boom: Boom, reach_map: ReachMap) -> str:
-    """What a map shows and what it stands on, in lines: hold, pitch and payload; which joints count; what is assumed."""
+    """Return a title in lines.
+
+    They give constraint, pitch and payload; the joints that count; and the assumptions.
+    """
     driven = [drive is not None and drive_torque_limit(drive, 0.0) is not None for drive in boom.drives]
     counted, left_out = (", ".join(j for j, d in zip(JOINTS, driven, strict=True) if d is which) for which in (True, False))
-    counts = f"torque margin of {counted} ({left_out or 'none'} without a drive: not counted)" if counted else "no drives"
+    without = f"; not counted, without drive data: {left_out}" if left_out else ""
+    counts = f"torque margin of {counted}{without}" if counted else "no drives"
     lines = [
-        f"{boom.name}: reach with hold {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg, "
+        f"{boom.name}: reach with constraint {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg, "
         f"payload {boom.payload.mass:g} kg",
         f"At rest on level ground; {counts}",
-        "Collision with ground, vehicle or the boom itself is not considered",
+        "Collisions with the ground, the vehicle or the boom itself are not checked",
     ]
     assumed: dict[str, list[str]] = {}
     for joint, drive in zip(JOINTS, boom.drives, strict=True):
@@ -96,21 +102,21 @@ def reach_title(boom: Boom, reach_map: ReachMap) -> str:
 
 
 def reference_pose(boom: Boom) -> tuple[Array, str]:
-    """A joint position (5,) in the map's plane to draw the boom at, and its name."""
+    """Return a joint position (5,) in the plane of the map, and its name, to draw the boom at."""
     phenotyping = boom.poses.get("phenotyping")
     q = (boom.limits.lower + boom.limits.upper) / 2.0 if phenotyping is None else phenotyping
-    return np.array([0.0, *q[1:]]), "middle of its ranges" if phenotyping is None else "phenotyping pose"
+    return np.array([0.0, *q[1:]]), "middle of its joint ranges" if phenotyping is None else "phenotyping pose"
 
 
 def margin_range(reach_map: ReachMap) -> tuple[float, float]:
-    """The margins that the colours run between: those of the map, rounded to tenths, and none below 0."""
+    """Return the range of the colours: the margins of the map to tenths, and none below 0."""
     tenths = 10.0 * reach_map.torque_margin
     low = max(float(np.floor(np.nanmin(tenths))) / 10.0, 0.0)
     return low, max(float(np.ceil(np.nanmax(tenths))) / 10.0, low + 0.1)
 
 
 def margin_colors(margin: Array, between: tuple[float, float]) -> Array:
-    """RGB (k, 3), 0 to 255, of margins (k,); OVERLOADED below 0, MARGIN_UNKNOWN for NaN."""
+    """Return RGB (k, 3), 0 to 255, of margins (k,); OVERLOADED below 0, MARGIN_UNKNOWN for NaN."""
     import matplotlib
 
     low, high = between
@@ -125,7 +131,7 @@ def _hex(color: tuple[int, int, int]) -> str:
 
 
 def _cell_colors(reach_map: ReachMap) -> Array:
-    """RGBA (m, n, 4), 0 to 1; transparent where nothing is reached."""
+    """Return RGBA (m, n, 4), 0 to 1, transparent where nothing is reached."""
     within, margin = reach_map.within_limits, reach_map.torque_margin
     between = margin_range(reach_map) if np.isfinite(margin).any() else (0.0, 1.0)
     colors = np.zeros((*within.shape, 4))
@@ -136,7 +142,7 @@ def _cell_colors(reach_map: ReachMap) -> Array:
 
 
 def _edges(middles: Array) -> Array:
-    """Bounds (n + 1,) of cells around their middles (n,); a single cell is a millimetre wide."""
+    """Return the bounds (n + 1,) of cells around their middles (n,); a single cell is 1 mm wide."""
     if middles.size == 1:
         return np.array([middles[0] - 5e-4, middles[0] + 5e-4])
     between = (middles[1:] + middles[:-1]) / 2.0
@@ -144,9 +150,12 @@ def _edges(middles: Array) -> Array:
 
 
 def _links(boom: Boom, q: Array) -> list[Array]:
-    """Base, inner link, and the arm from the shoulder by way of the outer link, as lines of (x, z) [m], for q with yaw 0."""
+    """Return the links as lines of (x, z) [m], for q with yaw 0.
+
+    They are the base, the inner link, and the arm from the shoulder along the outer link.
+    """
     outer = frame_transforms(boom, q, "outer")[:, :3, 3][:, [0, 2]]
     inner = frame_transforms(boom, q, "inner")[:, :3, 3][:, [0, 2]]
     shoulder, pins, wrist, tip = outer[4], outer[5:8], outer[8], outer[10]
-    corner = wrist + (boom.geometry.L7 + q[3]) * np.array([np.cos(q[2]), np.sin(q[2])])  # the actuator's axis, beside pin 8
+    corner = wrist + (boom.geometry.L7 + q[3]) * np.array([np.cos(q[2]), np.sin(q[2])])  # on the actuator's axis, beside pin 8
     return [np.array([outer[0], outer[2], shoulder]), inner[4:6], np.array([shoulder, *pins, corner, wrist, tip])]

@@ -1,4 +1,4 @@
-"""Several reports beside each other, check by check."""
+"""Several reports side by side, check by check."""
 
 from collections.abc import Mapping, Sequence
 
@@ -8,22 +8,22 @@ from planner.checks.rows import Row
 from planner.reports.markdown import section, table
 from planner.reports.report import Report, cells
 
-_BESIDES = ("mount", "tip")
+_NOT_JOINTS = ("mount", "tip")
 
 
 def compared(reports: Mapping[str, Report], joints: Sequence[str]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows for people: the drive checks of some joints, two columns a report.
+    """Return header and rows of a table: the drive checks of some joints, two columns per report.
 
     Args:
-        reports: by name, in order.
-        joints: whose rows; "tip" and "mount" have some too. None given means every joint's.
+        reports: the reports by name, in order.
+        joints: the joints to show; "tip" and "mount" are also allowed. Empty shows all.
 
     Raises:
-        InputError: no such joint.
+        InputError: unknown joint.
     """
     for joint in joints:
-        if joint not in (*JOINTS, *_BESIDES):
-            raise InputError(f"unknown joint {joint!r}; there are: {', '.join((*JOINTS, *_BESIDES))}")
+        if joint not in (*JOINTS, *_NOT_JOINTS):
+            raise InputError(f"unknown joint {joint!r}; there are: {', '.join((*JOINTS, *_NOT_JOINTS))}")
     by_check: dict[tuple[str, str], dict[str, Row]] = {}
     for name, report in reports.items():
         for row in report.rows:
@@ -33,18 +33,21 @@ def compared(reports: Mapping[str, Report], joints: Sequence[str]) -> tuple[tupl
     rows = []
     for (joint, check), found in by_check.items():
         kind = next(iter(found.values())).kind
-        if joint in _BESIDES or kind.part in DRIVE_PARTS:
+        if joint in _NOT_JOINTS or kind.part in DRIVE_PARTS:
             rows.append((joint, check, *(text for name in reports for text in _pair(found.get(name)))))
     return header, rows
 
 
 def comparison_markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """The table of `compared` as Markdown."""
+    """Return the table of `compared` as Markdown."""
     return "\n".join(table(header, rows)) + "\n"
 
 
 def side_by_side_markdown(reports: Mapping[str, Report], joints: Sequence[str]) -> str:
-    """Several reports as one in Markdown: their summaries, the table of `compared`, notes of each, what is assumed.
+    """Return several reports as one in Markdown.
+
+    It contains their summaries, the table of `compared`, the notes of each report, and the
+    assumptions.
 
     Raises:
         InputError: as `compared`.

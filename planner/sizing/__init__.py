@@ -1,0 +1,1 @@
+"""Choice of motors, gearboxes and actuators: the catalogue checked against a mission."""

@@ -1,4 +1,4 @@
-"""Which motor, wiring, voltage and gearbox would do for a joint: the whole catalogue held against a mission."""
+"""Choice of motor, wiring, voltage and gearbox for a joint, checked on a mission."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -34,48 +34,50 @@ from planner.motion.vehicle import LEVEL, VehicleCase
 from planner.progress import Track
 
 LARGEST_STRETCH = 8.0
-"""A mission whose moves would have to be slower than this many times is not rescaled."""
+"""Largest factor by which `Adapt.RESCALE` slows the moves of a mission."""
 
 _STRETCH_STEPS = 16
-_GIVEN = Origin(Basis.ASSUMED, "asked about")
+_GIVEN = Origin(Basis.ASSUMED, "candidate supply")
 
 
 class Adapt(StrEnum):
-    """What may change to suit a drive."""
+    """What may be adapted to a drive."""
 
     NOTHING = "nothing"
     RESCALE = "rescale"
-    """Every move slowed evenly, by the least factor with which nothing fails."""
+    """Slow every move by the same factor, the smallest with which no check fails."""
     REPLAN = "replan"
-    """Every move planned anew within the drive's limits."""
+    """Plan every move again within the limits of the drive."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A drive of one joint, held against a mission."""
+    """A drive of one joint with the results of its checks on a mission."""
 
     joint: str
     drive: Drive | LinearDrive
     rows: tuple[Row, ...]
-    """Of the drive alone, power-off left out; none where no motion was found."""
+    """Checks of this drive alone, without power-off; empty if no motion was found."""
     duration: float
-    """Of the cycle [s]."""
+    """Duration of the cycle [s]."""
     moving: float
-    """What its moves take of that [s]."""
+    """Total duration of the moves of the cycle [s]."""
     infeasible: str | None = None
-    """Why no motion was found."""
+    """Why no motion was found; None if one was found."""
 
     @property
     def verdict(self) -> Verdict:
-        """FAIL also where no motion was found; INCOMPLETE where a check has no data, which is no pass."""
+        """FAIL if a check fails or no motion was found; INCOMPLETE if a check has no data."""
         return Verdict.FAIL if self.infeasible is not None else overall(self.rows)
 
     @property
     def fails(self) -> bool:
+        """Whether the verdict is FAIL."""
         return self.verdict is Verdict.FAIL
 
     @property
     def first_failing(self) -> Row | None:
+        """The first check that fails."""
         return next((row for row in self.rows if row.verdict is Verdict.FAIL), None)
 
     @property
@@ -85,23 +87,24 @@ class Judged:
 
     @property
     def warned(self) -> tuple[str, ...]:
+        """Checks with a warning."""
         return tuple(row.check for row in self.rows if row.verdict is Verdict.WARN)
 
     @property
-    def by_room(self) -> tuple[Row, ...]:
-        """The rows with a limit that can FAIL, no guidelines; the least room beyond the required margin first."""
-        held = (Verdict.PASS, Verdict.WARN, Verdict.FAIL)
+    def by_spare(self) -> tuple[Row, ...]:
+        """The checks with a limit that can fail, sorted by `spare`, the smallest first."""
+        checked = (Verdict.PASS, Verdict.WARN, Verdict.FAIL)
         ranking = (row for row in self.rows if row.kind.severity is not Severity.GUIDELINE)
-        limited = (row for row in ranking if row.margin is not None and row.verdict in held)
-        return tuple(sorted(limited, key=room))
+        limited = (row for row in ranking if row.margin is not None and row.verdict in checked)
+        return tuple(sorted(limited, key=spare))
 
     def tightest(self, part: Part | None = None) -> Row | None:
-        """The first of them, of one part of the drive where that is given."""
-        return next((row for row in self.by_room if part is None or row.kind.part == part), None)
+        """Return the first row of `by_spare`, of one part of the drive where that is given."""
+        return next((row for row in self.by_spare if part is None or row.kind.part == part), None)
 
     @property
     def mass(self) -> float | None:
-        """Of motor and gearbox, or of the actuator [kg]; None where a sheet lacks one."""
+        """Mass of motor and gearbox, or of the actuator [kg]; None if a datasheet lacks one."""
         if isinstance(self.drive, LinearDrive):
             return self.drive.actuator.mass
         motor, gear = self.drive.motor.mass, self.drive.gearbox.mass
@@ -109,7 +112,7 @@ class Judged:
 
     @property
     def name(self) -> str:
-        """Motor and gearbox, or actuator."""
+        """Names of motor and gearbox, or of the actuator."""
         if isinstance(self.drive, LinearDrive):
             return self.drive.actuator.name
         return f"{self.drive.motor.name} + {self.drive.gearbox.name}"
@@ -124,14 +127,19 @@ class Judged:
 
 
 def candidates(boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[float] = ()) -> tuple[Drive | LinearDrive, ...]:
-    """Every motor, wiring, bus voltage and gearbox of a catalogue for a joint; every actuator for the extension.
+    """Return all combinations of motor, wiring, bus voltage and gearbox of a catalogue for a joint.
+
+    For the extension, return every actuator.
 
     Args:
-        voltages: bus voltages to try [V], but none on a motor that does not allow it; none given means the joint's own, or
-            that of the first joint that has one.
+        boom: the boom, with its fitted drives.
+        joint: name of the joint.
+        catalogue: the motors, gearboxes and actuators to combine.
+        voltages: bus voltages to try [V]; a motor is not tried on a voltage that it does not allow.
+            If empty, the joint's own voltage, or that of the first joint that has one.
 
     Raises:
-        InputError: no such joint, or a voltage that is not a positive number.
+        InputError: unknown joint, or a voltage that is not a positive number.
     """
     i = _index(joint)
     if IS_LENGTH[i]:
@@ -160,18 +168,25 @@ def size(
     payload_as: PayloadAs = "mass",
     vehicle: VehicleCase = LEVEL,
 ) -> tuple[Judged, ...]:
-    """Each drive on a joint, the others as they are: what does not fail, by mass and then by margin; what fails behind.
+    """Check each drive on a joint, with the other joints' drives unchanged, and rank the results.
 
-    The drives' own mass is in no body here: another one on the base changes no torque of inner and lower, one farther out
-    would.
+    Drives that do not fail come first, by mass and then by margin. The mass of a drive is not added
+    to any body here. A different mass at the base does not change the torques of inner and lower; a
+    mass farther out would.
 
     Args:
-        work: a planned cycle, which the drives are judged on; Adapt.REPLAN plans its mission anew for each, or takes a
-            mission that has not been planned.
-        vehicle: the slope that the boom stands on; the same as the cycle was planned for.
+        boom: the boom.
+        work: a planned cycle, on which the drives are checked. Adapt.REPLAN plans its mission again
+            for each drive, and also accepts a mission that has not been planned.
+        joint: name of the joint.
+        drives: the drives to check.
+        adapt: what may be adapted to a drive.
+        payload_as: see `inverse_dynamics`.
+        vehicle: the slope that the boom stands on; it must be the one that the cycle was planned
+            for.
 
     Raises:
-        InputError: no such joint, the vehicle moves, or a mission without Adapt.REPLAN.
+        InputError: unknown joint, a moving vehicle, or a mission without Adapt.REPLAN.
     """
     check_steady(vehicle)
     load = _Load(payload_as, vehicle)
@@ -190,34 +205,41 @@ def size(
 
 @dataclass(frozen=True)
 class Choice:
-    """What there is for a joint of one boom, and what the joint has."""
+    """The ranked drives for a joint of one boom, and the drive that is fitted."""
 
     variant: str
     joint: str
     fitted: Judged | None
     judged: tuple[Judged, ...]
-    """Ranked, as `size` gives them."""
+    """Ranked as `size` returns them."""
 
     @property
     def warned(self) -> tuple[str, ...]:
-        """What every drive is warned of."""
+        """Warnings that every drive has."""
         if not self.judged:
             return ()
         return tuple(check for check in self.judged[0].warned if all(check in judged.warned for judged in self.judged))
 
     @property
     def lightest(self) -> Judged | None:
-        """The first that does not fail."""
+        """The first drive that does not fail."""
         return next((judged for judged in self.judged if not judged.fails), None)
 
     @property
     def unmet(self) -> bool:
-        """Whether no drive does; an extension that the catalogue has nothing for is not counted, as none was looked at."""
+        """Whether no drive is suitable.
+
+        An extension for which the catalogue has no actuator does not count, because no drive was
+        checked.
+        """
         return self.lightest is None and (bool(self.judged) or not IS_LENGTH[JOINTS.index(self.joint)])
 
     @property
     def saves(self) -> float | None:
-        """How much lighter that is than what is fitted [kg]; None where one of them or its mass is not known."""
+        """Mass saved by the lightest drive over the fitted one [kg].
+
+        None if one of the drives or its mass is unknown.
+        """
         old, new = self.fitted, self.lightest
         if old is None or new is None or old.mass is None or new.mass is None:
             return None
@@ -235,12 +257,20 @@ def choose(
     track: Track = iter,
     vehicle: VehicleCase = LEVEL,
 ) -> tuple[Choice, ...]:
-    """The catalogue for each joint of each boom, on the same cycle or, with Adapt.REPLAN, on the same mission.
+    """Rank the drives of the catalogue for each joint of each boom.
+
+    All are checked on one cycle or, with Adapt.REPLAN, on one mission.
 
     Args:
         booms: variants by name, of the same geometry.
-        work, vehicle: as of `size`.
-        track: iterates over the drives, and may show how far it is.
+        work: see `size`.
+        joints: names of the joints.
+        catalogue: see `candidates`.
+        voltages: see `candidates`.
+        adapt: what may be adapted to a drive.
+        payload_as: see `inverse_dynamics`.
+        track: iterates over the drives, and may show progress.
+        vehicle: see `size`.
     """
     asked = [
         (name, boom, joint, candidates(boom, joint, catalogue, voltages)) for name, boom in booms.items() for joint in joints
@@ -260,10 +290,12 @@ def choose(
 def fitted(
     boom: Boom, work: Cycle | Mission, joint: str, payload_as: PayloadAs = "mass", vehicle: VehicleCase = LEVEL
 ) -> Judged | None:
-    """The drive that a joint has, held against a cycle, or against a mission that is planned for it; None where it has none.
+    """Check the fitted drive of a joint on a cycle, or on a mission that is planned here.
+
+    Return None if the joint has no drive.
 
     Raises:
-        InputError: no such joint, or the vehicle moves.
+        InputError: unknown joint, or a moving vehicle.
     """
     check_steady(vehicle)
     i, load = _index(joint), _Load(payload_as, vehicle)
@@ -276,7 +308,7 @@ def fitted(
 
 
 def too_high(catalogue: Catalogue, voltages: Sequence[float]) -> tuple[str, ...]:
-    """A sentence for each voltage that some motor does not allow, on which it is not tried."""
+    """Return a sentence for each voltage that some motor does not allow."""
     limits = {name: motor.max_voltage for name, motor in catalogue.motors.items() if motor.max_voltage is not None}
     sentences = []
     for voltage in dict.fromkeys(voltages):
@@ -285,22 +317,24 @@ def too_high(catalogue: Catalogue, voltages: Sequence[float]) -> tuple[str, ...]
             continue
         most = max(limits[name] for name in weak)
         if len(weak) == len(catalogue.motors):
-            sentences.append(f"{voltage:g} V is above what every motor allows ({most:g} V at most)")
+            sentences.append(f"{voltage:g} V exceeds the limit of every motor (at most {most:g} V)")
         else:
-            sentences.append(f"{voltage:g} V is above what {', '.join(weak)} allows, on which it is not tried")
+            sentences.append(f"{voltage:g} V exceeds the limit of {', '.join(weak)}; it is not tried there")
     return tuple(sentences)
 
 
 def parse_variant(boom: Boom, text: str) -> Boom:
-    """A boom with other masses [kg], as people write it: `inner=5.55`, `payload=5`, `inner=5.55,payload=5`.
+    """Return the boom with other masses [kg].
+
+    The text is `inner=5.55`, `payload=5` or `inner=5.55,payload=5`, for example.
 
     Raises:
-        InputError: no such body, or not a mass.
+        InputError: unknown body, or a value that is not a mass.
     """
     for part in text.split(","):
         name, equals, value = part.partition("=")
         if not equals:
-            raise InputError(f"variant {text!r}: {part!r} is no mass; give BODY=KG or payload=KG")
+            raise InputError(f"variant {text!r}: {part!r} is not a mass; give BODY=KG or payload=KG")
         try:
             mass = scalar(name, float(value))
         except ValueError:
@@ -332,7 +366,7 @@ def _wired(own: Drive | None, wiring: Wiring) -> Sourced[Wiring]:
 
 @dataclass(frozen=True)
 class _Load:
-    """What loads the joints besides the boom and its motion."""
+    """Loads on the joints besides the boom and its motion."""
 
     payload_as: PayloadAs
     vehicle: VehicleCase
@@ -344,7 +378,7 @@ def _mission(work: Cycle | Mission) -> Mission:
 
 def _planned(work: Cycle | Mission) -> Cycle:
     if isinstance(work, Mission):
-        raise InputError(f"mission {work.name} has not been planned; only Adapt.REPLAN plans it")
+        raise InputError(f"mission {work.name} has not been planned; plan it first, or use Adapt.REPLAN")
     return work
 
 
@@ -362,7 +396,11 @@ def _judged(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, vi
 
 
 def _rescaled(boom: Boom, cycle: Cycle, joint: str, drive: Drive | LinearDrive, load: _Load) -> Judged:
-    """Slowed by the least factor with which nothing fails, to a hundredth; by the largest where something fails even so."""
+    """Check the drive on the cycle slowed by the smallest factor with which no check fails.
+
+    The factor is found to 0.01. If a check fails even with LARGEST_STRETCH, return the result for
+    that factor.
+    """
 
     def slowed(factor: float) -> Judged:
         slower = cycle.stretched(factor)
@@ -389,12 +427,18 @@ def _replanned(boom: Boom, mission: Mission, joint: str, drive: Drive | LinearDr
     return _judged(other, cycle, joint, drive, _view(other, cycle, joint, load))
 
 
-def room(row: Row) -> float:
-    """How far a margin is beyond the required one, as a share of the least limit that this one allows."""
+def spare(row: Row) -> float:
+    """Return how far a margin exceeds the required one, relative to the smallest sufficient limit.
+
+    It is (1 + margin) / (1 + required margin) - 1.
+    """
     return (1.0 + (row.margin or 0.0)) / (1.0 + row.required_margin) - 1.0
 
 
 def _rank(judged: Judged) -> tuple[bool, float, tuple[float, ...]]:
-    """What does not fail, by mass, then by the least room, then by the next; the shared rows of one gearbox decide nothing."""
-    rooms = tuple(-room(row) for row in judged.by_room)
-    return judged.fails, np.inf if judged.mass is None else judged.mass, rooms
+    """Return the sorting key: failure, then mass, then the smallest `spare`, then the next.
+
+    Drives with the same gearbox share its rows, so the first different row decides between them.
+    """
+    spares = tuple(-spare(row) for row in judged.by_spare)
+    return judged.fails, np.inf if judged.mass is None else judged.mass, spares

@@ -1,25 +1,26 @@
-"""The choice of drives as pictures: what each drive weighs and what it has to spare."""
+"""Pictures of the choice of drives: the mass and the spare margin of each drive."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from planner.sizing.choice import Choice, room
+from planner.sizing.choice import Choice, spare
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MARKS = "osD^vPX*"
 _COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Okabe and Ito's, which the colour-blind can tell apart: one a drive."""
+"""Okabe and Ito's palette, readable with colour blindness: one colour per drive."""
 
 _SHOWN = (-0.5, 3.0)
-"""Rooms beyond are drawn at the edge."""
+"""Range of the spare margin shown; values outside are drawn at the edge."""
 
 
 def sizing_pictures(choices: Sequence[Choice]) -> dict[str, "Figure"]:
-    """A figure with a panel for each joint: drives by mass and by the least room beyond the required margin, by title.
+    """Return the figure by title: a panel per joint with drives by mass and smallest spare margin.
 
-    A drive without a mass on its sheet, and one for which no motion was found, has no place in it.
+    Drives without a mass on their datasheet, and drives for which no motion was found, are not
+    shown.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -41,10 +42,10 @@ def sizing_pictures(choices: Sequence[Choice]) -> dict[str, "Figure"]:
                 tightest = judged.tightest()
                 if judged.mass is None or tightest is None:
                     continue
-                spare = 100.0 * min(max(room(tightest), _SHOWN[0]), _SHOWN[1])
+                percent = 100.0 * min(max(spare(tightest), _SHOWN[0]), _SHOWN[1])
                 color = _COLORS[names.index(judged.name) % len(_COLORS)]
-                axes.plot(judged.mass, spare, mark, color=color, fillstyle="none" if judged.fails else "full", markersize=6)
-        axes.set(title=joint, xlabel="mass of the drive [kg]", ylabel="least room beyond what is required [%]")
+                axes.plot(judged.mass, percent, mark, color=color, fillstyle="none" if judged.fails else "full", markersize=6)
+        axes.set(title=joint, xlabel="mass of the drive [kg]", ylabel="smallest margin beyond the required one [%]")
         axes.margins(x=0.15)
         axes.grid(alpha=0.3, linewidth=0.5)
     for axes in panels[len(joints) :]:
@@ -56,4 +57,4 @@ def sizing_pictures(choices: Sequence[Choice]) -> dict[str, "Figure"]:
         key.plot([], [], _MARKS[k % len(_MARKS)], color="grey", label=f"boom: {variant}")
     key.plot([], [], "o", color="grey", fillstyle="none", label="hollow: FAIL")
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8)
-    return {"Drives by mass and room": figure}
+    return {"Drives by mass and spare margin": figure}

@@ -1,4 +1,4 @@
-"""What the choice of drives came to, as tables for people."""
+"""Results of the choice of drives as tables."""
 
 from collections.abc import Sequence
 from itertools import groupby
@@ -13,41 +13,47 @@ from planner.reports.markdown import section, table
 from planner.reports.report import cells
 from planner.sizing.choice import Adapt, Choice, Judged
 
-_SHAPED = {
-    Adapt.NOTHING: "every drive is judged on the motion that the boom as it is, with its fitted drives, was planned to make; "
-    "--adapt replan plans for each",
-    Adapt.RESCALE: "every drive is judged on the motion that the boom as it is, with its fitted drives, was planned to make, "
-    "slowed where it fails; --adapt replan plans for each",
-    Adapt.REPLAN: "every drive is judged on a motion that was planned for it, the other joints' drives as they are fitted",
+_ADAPT_NOTES = {
+    Adapt.NOTHING: "every drive is checked on the motion planned for the boom with its fitted drives; "
+    "--adapt replan plans a motion for each drive",
+    Adapt.RESCALE: "every drive is checked on the motion planned for the boom with its fitted drives, slowed where the drive "
+    "fails; --adapt replan plans a motion for each drive",
+    Adapt.REPLAN: "every drive is checked on a motion planned for it; the other joints keep their fitted drives",
 }
-_LEVEL_GROUND = "level ground; --vehicle gives a slope, and shocks are checked move by move"
-_STUCK = (
-    "no motion was found with any drive; the other joints keep their fitted ones, and where one of those is what cannot, "
-    "it has to be replaced first, in a boom file of your own"
+_LEVEL_GROUND = "the ground is level; --vehicle sets a slope; shocks are checked for single moves only"
+_NO_DRIVE_WORKS = (
+    "no motion was found with any drive; the other joints keep their fitted drives, and if one of those is the reason, "
+    "replace it first in a boom file of your own"
 )
 
-SAVING = ("boom", "joint", "fitted", "lightest without a FAIL", "saves")
+SAVING = ("boom", "joint", "fitted", "lightest without a FAIL", "saved mass")
 
 
 def ranking(choice: Choice) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: a row a drive, best first. What all are warned of is not said of each."""
+    """Return header and rows: one row per drive, best first.
+
+    Warnings that every drive has are left out of the rows.
+    """
     timed = len({judged.duration for judged in choice.judged}) > 1
-    header = ("", "drive", "supply", "mass", "least of the gearbox", "least of the motor", "warned of besides", "verdict")
+    header = ("", "drive", "supply", "mass", "tightest gearbox check", "tightest motor check", "other warnings", "verdict")
     rows: list[tuple[str, ...]] = []
     for place, judged in enumerate(choice.judged, start=1):
         mass = "-" if judged.mass is None else f"{judged.mass:.1f} kg"
         parts = (Part.ACTUATOR, None) if isinstance(judged.drive, LinearDrive) else (Part.GEARBOX, Part.MOTOR)
-        spare = ["-" if judged.fails or part is None else _margin(judged.tightest(part)) for part in parts]
-        warned = ", ".join(check for check in judged.warned if check not in choice.warned) or "-"
-        facts = ("-" if judged.fails else str(place), judged.name, judged.supply, mass, *spare, warned)
+        tightest = ["-" if judged.fails or part is None else _margin(judged.tightest(part)) for part in parts]
+        warnings = ", ".join(check for check in judged.warned if check not in choice.warned) or "-"
+        facts = ("-" if judged.fails else str(place), judged.name, judged.supply, mass, *tightest, warnings)
         cycle = "-" if judged.infeasible else f"{judged.moving:.1f} of {judged.duration:.0f} s"
-        said = outcome(judged) if judged.infeasible is None else "FAIL: no motion"
-        rows.append((*facts, *([cycle] if timed else []), said))
+        verdict = outcome(judged) if judged.infeasible is None else "FAIL: no motion"
+        rows.append((*facts, *([cycle] if timed else []), verdict))
     return (*header[:-1], *(["moving"] if timed else []), header[-1]), rows
 
 
 def no_motion(choice: Choice) -> tuple[str, ...]:
-    """Why there is no motion with a drive, a sentence a reason: too long for a table."""
+    """Return a sentence for each reason why drives have no motion.
+
+    These sentences are too long for a table.
+    """
     drives: dict[str, list[str]] = {}
     for judged in choice.judged:
         if judged.infeasible is not None:
@@ -56,7 +62,10 @@ def no_motion(choice: Choice) -> tuple[str, ...]:
 
 
 def outcome(judged: Judged) -> str:
-    """The verdict of a drive, or the first thing that fails; a check without data is no pass."""
+    """Return the verdict of a drive, or its first failing check.
+
+    A drive with a check without data is INCOMPLETE.
+    """
     if judged.infeasible is not None:
         return f"FAIL: {judged.infeasible}"
     failing = judged.first_failing
@@ -67,7 +76,10 @@ def outcome(judged: Judged) -> str:
 
 
 def motors(choices: Sequence[Choice]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows: each motor and gearbox, in its best supply, on each joint of each boom."""
+    """Return header and rows: one row per boom and joint, one column per motor and gearbox.
+
+    Each motor is shown with its best supply.
+    """
     names = list(dict.fromkeys(judged.name for choice in choices for judged in choice.judged))
     rows: list[tuple[str, ...]] = []
     for choice in choices:
@@ -77,7 +89,10 @@ def motors(choices: Sequence[Choice]) -> tuple[tuple[str, ...], list[tuple[str, 
 
 
 def saving(choices: Sequence[Choice]) -> list[tuple[str, ...]]:
-    """A row a joint of each boom under SAVING, and their sum where there is more than one joint."""
+    """Return one row under SAVING for each joint of each boom.
+
+    A row with their sum follows if a boom has several joints.
+    """
     rows: list[tuple[str, ...]] = []
     for variant, group in groupby(choices, key=lambda choice: choice.variant):
         parts = list(group)
@@ -91,24 +106,24 @@ def saving(choices: Sequence[Choice]) -> list[tuple[str, ...]]:
 
 
 def unknown_checks(choices: Sequence[Choice]) -> tuple[str, ...]:
-    """Checks that no drive's data allowed."""
+    """Return the checks for which no drive has data."""
     return tuple(dict.fromkeys(check for choice in choices for judged in choice.judged for check in judged.unknown))
 
 
 def sizing_markdown(title: str, choices: Sequence[Choice], notes: Sequence[str], assumed: Sequence[str] = ()) -> str:
-    """Everything as Markdown."""
-    lines = [f"# {title}", "", "## What the lightest saves", "", *table(SAVING, saving(choices))]
+    """Return all tables and notes as Markdown."""
+    lines = [f"# {title}", "", "## Mass saved by the lightest drive", "", *table(SAVING, saving(choices))]
     lines += ["", "## Each drive in its best supply", "", *table(*motors(choices))]
     for choice in (choice for choice in choices if choice.judged):
         lines += ["", f"## {choice.joint}, {choice.variant}", "", *table(*ranking(choice))]
         found = [f"- no motion with {sentence}" for sentence in no_motion(choice)]
         lines += ["", *found] if found else []
-        lines += ["", f"All are warned of: {', '.join(choice.warned)}"] if choice.warned else []
+        lines += ["", f"Every drive has these warnings: {', '.join(choice.warned)}"] if choice.warned else []
     return "\n".join([*lines, *section("Notes", notes), *section("Assumed", assumed)]) + "\n"
 
 
 def sizing_json(mission: str, choices: Sequence[Choice], notes: Sequence[str]) -> dict[str, Any]:
-    """The JSON object of `boom size`, in SI."""
+    """Return the JSON object of `boom size`, in SI."""
     return {
         "mission": mission,
         "choices": [
@@ -141,36 +156,39 @@ def _judged_json(judged: Judged) -> dict[str, Any]:
 def sizing_notes(
     choices: Sequence[Choice], adapt: Adapt = Adapt.NOTHING, vehicle: VehicleCase = LEVEL, left_out: Sequence[str] = ()
 ) -> tuple[str, ...]:
-    """What a reader of the tables must know.
+    """Return the notes that explain the tables.
 
     Args:
-        left_out: what was asked for and not tried, a sentence each.
+        choices: the choices of the tables.
+        adapt: what was adapted to a drive.
+        vehicle: the slope that the boom stands on; None means level ground.
+        left_out: a sentence for each requested combination that was not tried.
     """
     absent = dict.fromkeys(choice.joint for choice in choices if choice.fitted is None and choice.judged)
-    asked = (
-        [f"{', '.join(absent)}: no drive is given, and the mass of one is not added to the model's bodies"] if absent else []
-    )
+    by_joint = [f"{', '.join(absent)}: no drive is fitted; the mass of a new one is not added to any body"] if absent else []
     empty = dict.fromkeys(choice.joint for choice in choices if not choice.judged and not choice.unmet)
-    asked += [f"{', '.join(empty)}: NOT CHECKED, the catalogue has nothing for it"] if empty else []
+    by_joint += [f"{', '.join(empty)}: NOT CHECKED, the catalogue has no drive for it"] if empty else []
     none_left = dict.fromkeys(choice.joint for choice in choices if not choice.judged and choice.unmet)
-    asked += [f"{', '.join(none_left)}: NOT CHECKED, nothing of the catalogue is left to try"] if none_left else []
-    asked += dict.fromkeys(_cannot(choice) for choice in choices if choice.fitted is not None and choice.fitted.infeasible)
-    stuck = dict.fromkeys(choice.joint for choice in choices if choice.judged and all(j.infeasible for j in choice.judged))
-    asked += [f"{', '.join(stuck)}: {_STUCK}"] if stuck else []
+    by_joint += [f"{', '.join(none_left)}: NOT CHECKED, no drive of the catalogue is left to try"] if none_left else []
+    by_joint += dict.fromkeys(
+        _infeasible_note(choice) for choice in choices if choice.fitted is not None and choice.fitted.infeasible
+    )
+    no_drive = dict.fromkeys(choice.joint for choice in choices if choice.judged and all(j.infeasible for j in choice.judged))
+    by_joint += [f"{', '.join(no_drive)}: {_NO_DRIVE_WORKS}"] if no_drive else []
     unknown = ", ".join(unknown_checks(choices))
     notes = [
-        f"a margin is (limit - demand) / demand, and a motor's torque needs {STEPPER_MARGIN:.0%}; ranked by mass, then by the "
-        "least margin beyond the required one",
-        "power-off is the brake's matter and left out; see the mission's own report",
-        _SHAPED[adapt],
+        f"a margin is (limit - demand) / demand; motor torque needs a margin of {STEPPER_MARGIN:.0%}",
+        "drives are ranked by mass, then by the smallest margin beyond the required one",
+        "the power-off check is left out, because it depends on the brake; see the report of the mission",
+        _ADAPT_NOTES[adapt],
         _LEVEL_GROUND if vehicle is LEVEL else vehicle.sentence,
         *sorted({_tolerance(judged) for choice in choices for judged in choice.judged} - {""}),
     ]
-    notes += [f"no drive is known to pass, for want of data: {unknown}"] if unknown else []
-    return (*notes, *left_out, *asked)
+    notes += [f"no drive has the data for these checks, so none can PASS: {unknown}"] if unknown else []
+    return (*notes, *left_out, *by_joint)
 
 
-def _cannot(choice: Choice) -> str:
+def _infeasible_note(choice: Choice) -> str:
     why = None if choice.fitted is None else choice.fitted.infeasible
     return f"{choice.joint}, {choice.variant}: the fitted drives cannot do the mission: {why}"
 
@@ -178,20 +196,18 @@ def _cannot(choice: Choice) -> str:
 def _tolerance(judged: Judged) -> str:
     if isinstance(judged.drive, LinearDrive) or judged.drive.motor.tolerance is None:
         return ""
-    return (
-        f"motors differ by up to {judged.drive.motor.tolerance:.0%} from their sheet, which their required margin has to bear"
-    )
+    return f"a motor may differ by up to {judged.drive.motor.tolerance:.0%} from its datasheet; its margin must cover this"
 
 
 def _named(judged: Judged | None) -> str:
     if judged is None:
         return "none"
     mass = "" if judged.mass is None else f", {judged.mass:.1f} kg"
-    return f"{judged.name} ({judged.supply}){mass}" + (", finds no motion" if judged.infeasible else "")
+    return f"{judged.name} ({judged.supply}){mass}" + (", no motion found" if judged.infeasible else "")
 
 
 def _margin(row: Row | None) -> str:
-    """A check and its margin, with the one required where there is one."""
+    """Return a check with its margin, and with the required margin if the check fails."""
     if row is None:
         return "-"
     _, check, _, _, margin, required, *_ = cells(row)

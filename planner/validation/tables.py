@@ -1,10 +1,12 @@
-"""The thesis's printed tables, row by row, against this model.
+"""Comparison of the thesis's printed tables with this model, row by row.
 
-Rows that say "corrected" or "recomputed" hold figures that the thesis prints wrongly or not to this precision; they were
-found with independent rigid-body models of the same bodies, and guard this one against change.
+Rows marked "corrected" or "recomputed" contain values that the thesis prints wrongly, or with fewer
+digits. They were found with independent rigid-body models of the same bodies, and they guard this
+model against change.
 
-A figure is met within half a unit of its last printed digit; those of table 2-7, which are rounded twice or cut off, within a
-whole one. The tables' two known slips hold the corrected value and say so.
+A value must agree within half a unit of its last printed digit. Values of table 2-7 must agree
+within one unit, because the thesis rounded them twice or truncated them. The two known misprints of
+the tables are replaced by the corrected value, and the note of the row says so.
 """
 
 import csv
@@ -32,16 +34,19 @@ from planner.paths.path import JointLine
 from planner.timing.profiles.cubic import cubic
 from planner.timing.time_law import Motion
 
-_HALF_DIGIT = 0.0005 + 1e-9  # tables 2-6 to 2-8 print three decimals; the rest is the rounding of a binary half
+_HALF_DIGIT = 0.0005 + 1e-9  # tables 2-6 to 2-8 print three decimals; 1e-9 allows for binary rounding
 _WHOLE_DIGIT = 0.001 + 1e-9
 
 _JOINT_1 = (0.2288, 0.2059, 0.2303, 0.2984, 0.3695, 0.3712, 0.2388, -0.0417, -0.4228, -0.8174, -1.1236)
-"""Joint 1 of table 2-8 for the same load by virtual work and by an independent rigid-body model, to four decimals [Nm]."""
+"""Joint 1 of table 2-8 for the same load, to four decimals [Nm].
+
+The values were found by virtual work and by an independent rigid-body model.
+"""
 
 
 @dataclass(frozen=True)
 class ValidationRow:
-    """One printed figure against the model's."""
+    """One printed value and the model's value."""
 
     table: str
     row: str
@@ -53,11 +58,16 @@ class ValidationRow:
 
     @property
     def ok(self) -> bool:
+        """Whether the two values agree within the tolerance."""
         return bool(abs(self.actual - self.expected) <= self.tolerance)
 
 
 def validate(boom: Boom) -> tuple[ValidationRow, ...]:
-    """Tables 2-5 to 2-8 and 3-2, the loads of sections 3.5 and 3.6 and the link of chapter 3 against a boom's model."""
+    """Compare a boom's model with the thesis's tables.
+
+    These are tables 2-5 to 2-8 and 3-2, the loads of sections 3.5 and 3.6, and the link of chapter
+    3.
+    """
     motion = table_2_4_motion(boom)
     return (
         *_table_2_5(motion),
@@ -71,14 +81,14 @@ def validate(boom: Boom) -> tuple[ValidationRow, ...]:
 
 
 def table_2_4_motion(boom: Boom) -> Motion:
-    """The thesis's test path: a cubic of 10 s (table 2-4)."""
+    """Return the thesis's test path: a cubic of 10 s (table 2-4)."""
     start, goal = np.radians([0, 90, 180, 0, 0]), np.radians([90, 45, 150, 0, 90])
     goal[3] = 0.5
     return _cubic_motion(boom, start, goal, 10.0)
 
 
 def table_3_1_motion(boom: Boom) -> Motion:
-    """The thesis's move from transport to phenotyping: a cubic of 5 s (table 3-1)."""
+    """Return the thesis's move from transport to phenotyping: a cubic of 5 s (table 3-1)."""
     start, goal = np.radians([0, 0, 30, 0, -45]), np.radians([90, 60, 180, 0, 0])
     goal[3] = 1.0
     return _cubic_motion(boom, start, goal, 5.0)
@@ -104,7 +114,7 @@ def _table_2_5(motion: Motion) -> Iterator[ValidationRow]:
                 float(printed[f"c{power}"]),
                 coefficient * unit,
                 1e-9,
-                "exact in decimals",
+                "exact in decimal notation",
             )
 
 
@@ -123,19 +133,19 @@ def _table_2_7(boom: Boom) -> Iterator[ValidationRow]:
         target = [float(printed[f"{axis}_m"]) for axis in "xyz"]
         pitch = -np.pi / 2.0 if printed["pitch"] == "down" else np.pi / 2.0
         fixed = printed["hold"] == "extension_m"
-        hold = FixedExtension(float(printed["hold_value"])) if fixed else ActuatorHorizontal()
-        branches = [s.q for s in inverse_kinematics(boom, target, pitch, hold).solutions]
+        constraint = FixedExtension(float(printed["hold_value"])) if fixed else ActuatorHorizontal()
+        branches = [s.q for s in inverse_kinematics(boom, target, pitch, constraint).solutions]
         nearest = min(branches, key=lambda branch: float(np.abs(branch - q).max()), default=np.full(5, np.nan))
         for i, joint in enumerate(JOINTS):
-            note = "pi, printed as 3.141 without rounding" if f"{q[i]:.3f}" == "3.141" else ""
+            note = "pi, truncated to 3.141 in print" if f"{q[i]:.3f}" == "3.141" else ""
             if printed["test"] == "5" and joint == "yaw":
-                note = "corrected: the printed 0.785 puts the tip at x = y; pi/2 reaches the target"
+                note = "corrected: with the printed 0.785 the tip is at x = y; pi/2 reaches the target"
             unit = "m" if joint == "extension" else "rad"
             yield ValidationRow(
                 "2-7", f"test {printed['test']}", f"{joint} [{unit}]", float(q[i]), float(nearest[i]), _WHOLE_DIGIT, note
             )
         for axis, wanted, value in zip("xyz", target, forward_kinematics(boom, q).position, strict=True):
-            note = "tip of the printed joints, two decimals"
+            note = "tip position of the printed joint values, which have two decimals"
             yield ValidationRow("2-7", f"test {printed['test']}", f"{axis} [m]", wanted, float(value), 0.005, note)
 
 
@@ -145,7 +155,7 @@ def _table_2_8(boom: Boom, motion: Motion) -> Iterator[ValidationRow]:
     loads = inverse_dynamics(boom.with_payload(10.0), q, qd, qdd, payload_as="force", reactions=False)
     for row, tau, corrected in zip(printed, loads.tau, _JOINT_1, strict=True):
         at = f"t = {row['time_s']} s"
-        note = f"corrected: the printed {row['matlab_tau1_Nm']} holds a wrong inertial force of the inner link"
+        note = f"corrected: the printed {row['matlab_tau1_Nm']} contains a wrong inertial force of the inner link"
         yield ValidationRow("2-8", at, "tau1 [Nm]", corrected, float(tau[0]), 0.00005 + 1e-9, note)
         for i in range(1, 5):
             unit = "N" if i == 3 else "Nm"
@@ -154,13 +164,19 @@ def _table_2_8(boom: Boom, motion: Motion) -> Iterator[ValidationRow]:
 
 
 def _section_3_5(boom: Boom) -> Iterator[ValidationRow]:
-    """Loads of the inner link on table 3-1's move, at the thesis's steps of 0.01 s, payload as force."""
+    """Yield the loads of the inner link on table 3-1's move.
+
+    They use the thesis's steps of 0.01 s, and the payload as a force.
+    """
     q, qd, qdd, _ = table_3_1_motion(boom)(np.linspace(0.0, 5.0, 501))
     loads = inverse_dynamics(boom.with_payload(10.0), q, qd, qdd, payload_as="force")
     if loads.pins is None:
-        raise RuntimeError("reactions were asked for")
+        raise RuntimeError("inverse_dynamics returned no pin forces")
     f8 = -inner_link_load(q, loads.pins)
-    f8_note = "recomputed, of the inner on the upper link in frame 5: 758.1 and 859.9 N do not follow from this move"
+    f8_note = (
+        "recomputed: force of the inner link on the upper link in frame 5; "
+        "the printed 758.1 and 859.9 N do not follow from this move"
+    )
     for axis, low, high in ((0, -440.9, 935.8), (1, 85.0, 176.0)):
         for bound, expected, actual in (("least", low, f8[:, axis].min()), ("largest", high, f8[:, axis].max())):
             name = f"f8{'xy'[axis]} [N]"
@@ -185,7 +201,7 @@ def _section_3_5(boom: Boom) -> Iterator[ValidationRow]:
 
 
 def _section_3_6(boom: Boom) -> Iterator[ValidationRow]:
-    """How much joint 2's torque falls with the thesis's optimised inner link."""
+    """Yield the reduction of joint 2's torque with the thesis's optimised inner link."""
     q, qd, qdd, _ = table_3_1_motion(boom)(np.linspace(0.0, 5.0, 501))
     inertia = [[0.014, 0.0, -0.001], [0.0, 0.486, 0.0], [-0.001, 0.0, 0.477]]
     optimised = Body(5.55, read_only([0.3627, 0.0014, 0.0]), read_only(inertia))
@@ -194,24 +210,27 @@ def _section_3_6(boom: Boom) -> Iterator[ValidationRow]:
         inverse_dynamics(b.with_payload(10.0), q, qd, qdd, payload_as="force", reactions=False).tau[:, 1]
         for b in (boom, lighter)
     )
-    saved = 100.0 * (1.0 - after / before)
-    note = "recomputed; printed as 12-11 %"
-    yield ValidationRow("3-25", "least of the move", "tau2 saved [%]", 10.98, float(saved.min()), 0.005 + 1e-9, note)
-    yield ValidationRow("3-25", "largest of the move", "tau2 saved [%]", 11.71, float(saved.max()), 0.005 + 1e-9, note)
+    reduction = 100.0 * (1.0 - after / before)
+    note = "recomputed: printed as 12-11 %"
+    yield ValidationRow("3-25", "least of the move", "tau2 saved [%]", 10.98, float(reduction.min()), 0.005 + 1e-9, note)
+    yield ValidationRow("3-25", "largest of the move", "tau2 saved [%]", 11.71, float(reduction.max()), 0.005 + 1e-9, note)
 
 
 def _table_3_2() -> Iterator[ValidationRow]:
-    """The thesis's link by its own method: load case of section 3.5, 1000 slices, steps of 0.1 mm."""
+    """Yield the thesis's link designed by its own method.
+
+    The load case is that of section 3.5, with 1000 slices and steps of 0.1 mm.
+    """
     steel = Material.load("steel")
     beam = Beam(length=1.0, width=0.01, material=steel)
     design = thesis_design(beam, THESIS_LOAD, stress_limit=175e6, deflection_limit=0.01)
-    cut_off = "printed without rounding: the table's own 175.0 at 0.7 m is above it"
+    truncated = "truncated in print: the table's own 175.0 at 0.7 m is larger"
     for row in _read("table_3_2_beam_stress.csv"):
         last = row["x_m"] == "max"
         stress = design.stress.max() if last else design.stress[round(1000 * float(row["x_m"]))]
         at, tolerance = ("largest", 0.1) if last else (f"x = {row['x_m']} m", 0.05)
         printed = 1e-6 * float(row["program_stress_Pa"])
-        note = cut_off if last else ""
+        note = truncated if last else ""
         yield ValidationRow("3-2", at, "stress [MPa]", printed, float(1e-6 * stress), tolerance + 1e-9, note)
     for stage, H in (("stage 1", design.stress_heights), ("stage 2", design.heights)):
         yield ValidationRow("3-19", stage, "end's height [mm]", 1.0, float(1e3 * H[-1]), 1e-9, "printed in section 3.6")
@@ -219,18 +238,17 @@ def _table_3_2() -> Iterator[ValidationRow]:
     again = float((design.coefficients / design.moments.clip(min=1e-300) * np.abs(own) / design.heights**3)[:-1].sum())
     for stage, expected, actual, tolerance, note in (
         ("stage 1", 2.1, design.stress_deflection, 0.05, ""),
-        ("stage 2", 1.0, design.deflection, 0.00005, "by its own formula: the moments of stage 1"),
-        ("stage 2, own mass", 1.0019, again, 0.00005, "recomputed with its final mass: above its limit"),
+        ("stage 2", 1.0, design.deflection, 0.00005, "by the thesis's formula, with the moments of stage 1"),
+        ("stage 2, own mass", 1.0019, again, 0.00005, "recomputed with the final mass: above the thesis's limit"),
     ):
         yield ValidationRow("3-3", stage, "end's deflection [cm]", expected, 100.0 * actual, tolerance + 1e-9, note)
     solid = euler_load(steel.elastic_modulus, 0.02 * 0.01**3 / 12.0, 1.0)
-    yield ValidationRow(
-        "3.38", "2 cm x 1 cm", "buckling [N]", 6700.0, solid, 50.0 + 1e-9, "one solid; two loose plates: a quarter"
-    )
+    note = "one solid section; two loose plates carry a quarter of it"
+    yield ValidationRow("3.38", "2 cm x 1 cm", "buckling [N]", 6700.0, solid, 50.0 + 1e-9, note)
 
 
 def _read(name: str) -> list[dict[str, str]]:
-    """The rows of a table as text: a note may quote a figure as it is printed."""
+    """Return the rows of a table as text, because a note may quote a value as it is printed."""
     text = (files("planner.validation") / "thesis_tables" / name).read_text(encoding="utf-8")
     return list(csv.DictReader(text.splitlines()))
 

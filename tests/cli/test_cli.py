@@ -352,7 +352,7 @@ def test_missions_stand_side_by_side(boom, tmp_path):
 def test_size_ranks_the_catalogue(boom, tmp_path):
     code, out, err = boom("size", "table-3-1", "--variant", "inner=5.55", "--voltage", "80", "--report", "drives.md")
     assert (code, err) == (0, "")
-    assert "Note: extension: NOT CHECKED, the catalogue has nothing for it" in out
+    assert "Note: extension: NOT CHECKED, the catalogue has no drive for it" in out
     assert "| inner=5.55 | together |  |  | 2.0 kg |" in (tmp_path / "drives.md").read_text()
     code, out, _ = boom("size", "table-3-1", "--joint", "inner", "--json")
     (choice,) = json.loads(out)["choices"]
@@ -367,7 +367,7 @@ def test_size_says_which_voltage_no_motor_allows(boom):
         options = [part for voltage in voltages for part in ("--voltage", voltage)]
         found, out, _ = boom("size", "table-3-1", "--joint", "inner", *options)
         assert found == code
-        assert "Note: 200 V is above what every motor allows (165 V at most)" in out
+        assert "Note: 200 V exceeds the limit of every motor (at most 165 V)" in out
 
 
 def test_size_stands_on_a_slope(boom):

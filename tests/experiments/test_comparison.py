@@ -122,7 +122,7 @@ def test_the_filters_gain_is_the_textbooks():
     gain = np.sqrt(720.0 / (N * (N**2 - 1) * (N**2 - 4))) / h**2
     np.testing.assert_allclose(left(ready), ready.noise * gain, rtol=1e-9)
     from_velocities = smoothed(Log.of(t, noisy(t, q), noisy(t, qd)), window=0.2)
-    assert "accelerations are not in the log: taken from its velocities" in from_velocities.trajectory.notes[0]
+    assert "the log has no accelerations; they are computed from its velocities" in from_velocities.trajectory.notes[0]
     assert (left(from_velocities) < 0.2 * left(ready)).all()
 
 
@@ -182,12 +182,12 @@ def test_uneven_steps_are_evened_out_and_said_so():
     t = np.cumsum(rng.uniform(0.8e-3, 1.2e-3, 20_000))
     q, _, qdd = smooth_motion(t)
     ready = smoothed(Log.of(t, q))
-    assert "not even" in ready.trajectory.notes[0]
+    assert "uneven" in ready.trajectory.notes[0]
     _, _, expected = smooth_motion(ready.trajectory.t)
     inner = ready.inside
     assert np.abs(ready.trajectory.qdd - expected)[inner].max() < 1e-3
     assert np.abs(qdd).max() > 0.3
-    assert smoothed(Log.of(np.arange(100) * 0.01, q[:100])).trajectory.notes[0].startswith("velocities")
+    assert smoothed(Log.of(np.arange(100) * 0.01, q[:100])).trajectory.notes[0].startswith("the log has no velocities")
 
 
 def test_notes_say_whose_they_are_and_what_is_assumed():
@@ -196,18 +196,18 @@ def test_notes_say_whose_they_are_and_what_is_assumed():
     found = compare(replace(BOOM, friction=friction), plan_from_file, Log.of(MOVE.t, MOVE.q, MOVE.qd))
     plan_note, log_note, assumed = found.notes
     assert plan_note == "plan: from a file"
-    assert log_note.startswith("log: accelerations are not in the log: taken from its velocities")
-    assert assumed == "inner friction is assumed: this test"
+    assert log_note.startswith("log: the log has no accelerations; they are computed from its velocities")
+    assert assumed == "the friction of inner is assumed: this test"
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"window": 0.0}, "window is 0 s"),
-        ({"window": 0.02}, "holds 3 samples of a log with steps of 0.00998623 s"),
+        ({"window": 0.02}, "contains 3 samples of a log with steps of 0.00998623 s"),
         ({"window": 9.0}, "a window of 9 s needs"),
         ({"offset": np.nan}, "offset is nan"),
-        ({"offset": 50.0}, "no two samples in common; the offset that fits best is"),
+        ({"offset": 50.0}, "fewer than two samples in common; the offset that fits best is"),
     ],
 )
 def test_what_cannot_be_compared_is_refused(change: dict[str, float], message: str):
@@ -280,7 +280,7 @@ def test_compare_prints_a_table_or_json_and_records(boom):
     assert (code, err) == (0, "")
     assert Path("both.rrd").exists()
     assert "Savitzky-Golay filter over 21 samples" in out
-    assert "tip: up to" in out
+    assert "tip error: at most" in out
     code, out, _ = boom("compare", "move.csv", "log.csv", "--offset", "-30", "--json")
     answer = json.loads(out)
     assert (code, answer["offset_s"], answer["files"]) == (0, -30.0, {})
@@ -305,7 +305,7 @@ def test_exports_by_the_command(boom):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("compare", "move.csv", "log.csv"), "no two samples in common"),
+        (("compare", "move.csv", "log.csv"), "fewer than two samples in common"),
         (("compare", "move.csv", "log.csv", "--offset", "soon"), "neither a number of seconds nor best"),
         (("compare", "move.csv", "none.csv"), "none.csv: cannot be read"),
         (("compare", "move.csv", "log.csv", "--out", "none/x.rrd"), "cannot be written"),

@@ -33,7 +33,7 @@ from planner.reports.report import cells
 
 BOOM = Boom.load()
 FLOAT32 = 5e-7
-FOR_THE_EYE = Origin(Basis.ASSUMED, "this test")
+SURROUNDINGS_NOTE = Origin(Basis.ASSUMED, "this test")
 
 
 class Read:
@@ -142,7 +142,7 @@ def test_legend_names_every_band(panel: Read):
         assert panel.static(f"/legend/{k}", "Points2D:colors") == [(int(color, 16) << 8) + 255]
     names = [panel.static(f"/legend/{k}/name", "Points2D:labels")[0] for k in range(len(BANDS))]
     assert names == ["below 0.2", "0.2 to 0.4", "0.4 to 0.6", "0.6 to 0.8", "0.8 to 1", "over the limit"]
-    assert panel.titles()["/legend"] == "Path of the tip: torque / limit of the worst drive [-]"
+    assert panel.titles()["/legend"] == "Path of the tip: largest torque / limit of all drives [-]"
 
 
 def test_ratio_of_every_drive_is_plotted_beside_its_limit(panel: Read, move: Move):
@@ -164,7 +164,7 @@ def test_without_drives_the_path_says_so(tmp_path: Path):
     bare = plan(replace(BOOM, drives=(None,) * 5), "transport", "phenotyping", step=0.1)
     panel = read(tmp_path, bare)
     assert panel.static("/world/tip_path", "LineStrips3D:colors") == [packed(LIGHT)]
-    assert panel.static("/legend/0/name", "Points2D:labels") == ["no drive's limit is known"]
+    assert panel.static("/legend/0/name", "Points2D:labels") == ["no drive limit is known"]
     assert not [name for name in panel.entities() if name.startswith(("/plots/ratio", "/plots/margin", "/plane"))]
 
 
@@ -197,21 +197,21 @@ def test_arrows_are_the_loads_to_the_scale_that_is_stated(panel: Read, move: Mov
 # Ground, vehicle, reach
 
 
-def test_ground_and_vehicle_are_marked_as_drawn_for_the_eye(panel: Read, move: Move):
+def test_ground_and_vehicle_are_marked_as_for_display_only(panel: Read, move: Move):
     for name in ("ground", "vehicle"):
-        assert panel.static(f"/world/{name}", "Boxes3D:labels") == [f"{name}, drawn for the eye"]
+        assert panel.static(f"/world/{name}", "Boxes3D:labels") == [f"{name}, for display only"]
     ((_, _, ground),) = panel.static("/world/ground", "Boxes3D:centers")
     assert ground < forward_kinematics(BOOM, move.trajectory.q).position[:, 2].min() - 0.2
-    assert "drawn for the eye: the boom's file describes neither" in panel.static("/assumptions", "TextDocument:text")[0]
+    assert "for display only, because the boom file does not define" in panel.static("/assumptions", "TextDocument:text")[0]
 
 
 def test_shapes_of_the_booms_file_take_their_place(tmp_path: Path):
-    shape = Box("cab", np.array([-2.0, 0.0, -1.0]), np.ones(3), FOR_THE_EYE)
-    given = replace(BOOM, keep_out=KeepOut((shape,), 0.05, 0.05, 0.1, FOR_THE_EYE))
+    shape = Box("cab", np.array([-2.0, 0.0, -1.0]), np.ones(3), SURROUNDINGS_NOTE)
+    given = replace(BOOM, keep_out=KeepOut((shape,), 0.05, 0.05, 0.1, SURROUNDINGS_NOTE))
     panel = read(tmp_path, plan(given, "transport", "phenotyping", step=0.1))
     assert {"/world/ground", "/world/vehicle"}.isdisjoint(panel.entities())
     assert "/world/keep_out/cab" in panel.entities()
-    assert "drawn for the eye" not in panel.static("/assumptions", "TextDocument:text")[0]
+    assert "drawn for display only" not in panel.static("/assumptions", "TextDocument:text")[0]
 
 
 def test_reach_is_drawn_where_it_is_asked_for(tmp_path: Path, panel: Read, move: Move):
@@ -220,7 +220,7 @@ def test_reach_is_drawn_where_it_is_asked_for(tmp_path: Path, panel: Read, move:
     with_reach = read(tmp_path, move, reach=found)
     strips = with_reach.static("/world/reach", "LineStrips3D:strips")
     assert with_reach.static("/world/reach", "CoordinateFrame:frame") == ["base"]  # and so it yaws with the boom
-    assert with_reach.titles()["/world"].endswith(f"; grey line: reach with hold {hold}, pitch -90 deg")
+    assert with_reach.titles()["/world"].endswith(f"; grey line: reach with constraint {hold}, pitch -90 deg")
     assert "/world/reach" not in panel.entities()
     points = np.concatenate([np.array(strip) for strip in strips])
     np.testing.assert_allclose(points, np.concatenate([np.insert(line, 1, 0.0, axis=1) for line in boundary(found)]), atol=1e-6)
@@ -258,7 +258,7 @@ def test_operating_point_moves_in_the_torque_speed_plane(panel: Read, move: Move
         given = available_torque(drive, curve[:, 0] / tick("rpm", 0) * np.pi / 30.0) / share
         np.testing.assert_allclose((1.0 - curve[:, 1]) / tick("Nm", 1), given, rtol=0, atol=1e-4)
     title = panel.titles()[entity]
-    assert title == f"{joint}, MST342C02: motor torque [Nm] over speed [rpm], in size; 80 V, parallel"
+    assert title == f"{joint}, MST342C02: absolute motor torque [Nm] over speed [rpm]; 80 V, parallel"
     assert panel.static(f"{entity}/available/name", "Points2D:labels") == ["available (assumed)"]
 
 
@@ -377,7 +377,7 @@ def test_lines_of_a_boom_lead_from_pin_to_pin(several: Read, moves: dict[str, Mo
 
 def test_moves_that_cannot_share_a_scene_are_refused(tmp_path: Path):
     ridden = plan(BOOM, "transport", "phenotyping", step=0.1, vehicle=load_case("slope"))
-    for given, message in (({}, "no move to record"), ({"slope": ridden}, "cannot share a mount")):
+    for given, message in (({}, "moves is empty"), ({"slope": ridden}, "cannot share one recording")):
         with pytest.raises(InputError, match=message):
             write_moves_recording(tmp_path / "none.rrd", given, "")
     assert not list(tmp_path.iterdir())
@@ -407,11 +407,11 @@ def test_reach_is_recorded_by_the_command(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     at_rest = ("plan", "transport", "transport", "--show-reach")
     assert boom(monkeypatch, *at_rest, "--hold", "extension=0.25") == 0
-    assert "; grey line: reach with hold extension=0.25 m, pitch -90 deg" in Read(tmp_path / "move.rrd").titles()["/world"]
+    assert "; grey line: reach with constraint extension=0.25 m, pitch -90" in Read(tmp_path / "move.rrd").titles()["/world"]
     assert boom(monkeypatch, *at_rest, "--hold", "extension=5", "--out", "nothing.rrd") == 0
     nothing = Read(tmp_path / "nothing.rrd")
     assert "/world/reach" not in nothing.entities()
-    assert nothing.titles()["/world"].endswith("; nothing in reach with hold extension=5 m, pitch -90 deg")
+    assert nothing.titles()["/world"].endswith("; no point reachable with constraint extension=5 m, pitch -90 deg")
     capsys.readouterr()
     assert boom(monkeypatch, *at_rest, "--pitch", "free") == 2
     assert capsys.readouterr().err == "boom: pitch free: the reach is drawn for one pitch\n"

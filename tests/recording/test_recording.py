@@ -239,8 +239,8 @@ def test_series_say_what_they_are_in_which_unit_and_what_is_assumed(recorded: Re
     assert recorded.static("/plots/tau/extension", "SeriesLines:names") == ["extension force [N]"]
     assert recorded.static("/plots/tau/wrist", "SeriesLines:names") == ["wrist torque [Nm]"]
     assert recorded.static("/plots/tau/inner/limits", "SeriesLines:names") == [
-        "drive's lower limit [Nm] (assumed)",  # by the assumed supply
-        "drive's upper limit [Nm] (assumed)",
+        "lower drive limit [Nm] (assumed)",  # by the assumed supply
+        "upper drive limit [Nm] (assumed)",
     ]
 
 

@@ -160,7 +160,7 @@ JOBS = {
         [f"table {n}: {title}" for n in ("2-4", "3-1") for title in TITLES[3:]],
         "brake present",
     ),
-    "size": (("size", "table-3-1", "--joint", "inner"), ["Drives by mass and room"], "brake present"),
+    "size": (("size", "table-3-1", "--joint", "inner"), ["Drives by mass and spare margin"], "brake present"),
     "link": (("link", "--load", "thesis", "--slices", "60"), ["Design", "Convergence"], "brake present"),
 }
 

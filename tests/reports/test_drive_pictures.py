@@ -31,7 +31,7 @@ def test_the_plane_holds_the_motion_both_ways_and_the_curve(i, joint):
     drive, motion = BOOM.drives[i], MOVE.trajectory
     found = curves(drawn()[f"{joint}: MST342C02"])
     speed = 160 * np.abs(motion.qd[:, i])
-    for name, sign in (("the motion", 1.0), ("the same backwards", -1.0)):
+    for name, sign in (("motion", 1.0), ("motion reversed", -1.0)):
         torque = motor_torque(drive, MOVE.loads.tau[:, i], sign * motion.qd[:, i], motion.qdd[:, i])
         np.testing.assert_allclose(found[name], np.stack([speed * 30 / np.pi, np.abs(torque)], axis=-1), rtol=1e-12)
     (curve,) = (xy for name, xy in found.items() if name.startswith("available (estimated, 80 V parallel (assumed))"))
@@ -41,7 +41,7 @@ def test_the_plane_holds_the_motion_both_ways_and_the_curve(i, joint):
 
 def test_the_gearbox_has_its_ratings_beside_it():
     found = curves(drawn()["inner: CBG320160"])
-    np.testing.assert_allclose(found["torque, size"][:, 1], np.abs(MOVE.loads.tau[:, 1]), rtol=1e-12)
+    np.testing.assert_allclose(found["absolute torque"][:, 1], np.abs(MOVE.loads.tau[:, 1]), rtol=1e-12)
     assert {f"{name} Nm" for name in ("rated 172", "largest average 275", "start-stop 460")} <= found.keys()
 
 
@@ -57,7 +57,7 @@ def test_every_margin_is_a_bar():
 def test_the_tips_budget_is_in_millimetres():
     axes = next(axes for title, axes in drawn().items() if title.startswith("tip"))
     budget = tip_deflection(BOOM, MOVE.trajectory.q, MOVE.loads.tau)
-    np.testing.assert_allclose(curves(axes)["in all"][:, 1], 1e3 * budget.total, rtol=1e-12)
+    np.testing.assert_allclose(curves(axes)["total"][:, 1], 1e3 * budget.total, rtol=1e-12)
 
 
 def test_a_missions_moves_stand_end_to_end():
@@ -75,7 +75,7 @@ def test_a_missions_moves_stand_end_to_end():
 def test_without_a_supply_the_running_torque_stands_for_the_curve():
     boom = replace(BOOM, drives=tuple(d and replace(d, bus_voltage=None) for d in BOOM.drives))
     found = curves(drawn(boom=boom)["inner: MST342C02"])
-    assert "running torque; the curve needs voltage and wiring" in found
+    assert "running torque (the curve needs voltage and wiring)" in found
 
 
 def test_a_boom_without_motors_has_nothing_to_show(tmp_path):

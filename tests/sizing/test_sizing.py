@@ -18,8 +18,8 @@ from planner.sizing.choice import (
     choose,
     fitted,
     parse_variant,
-    room,
     size,
+    spare,
     too_high,
 )
 from planner.sizing.tables import motors, outcome, ranking, saving, sizing_json, sizing_markdown, sizing_notes
@@ -45,7 +45,7 @@ def test_candidates_are_every_motor_wiring_voltage_and_gearbox():
     assert {d.bus_voltage.origin.source for d in found if d.bus_voltage.value == 80.0} == {
         BOOM.drives[1].bus_voltage.origin.source
     }
-    assert {d.bus_voltage.origin.source for d in found if d.bus_voltage.value == 48.0} == {"asked about"}
+    assert {d.bus_voltage.origin.source for d in found if d.bus_voltage.value == 48.0} == {"candidate supply"}
     assert {d.brake for d in found} == {BOOM.drives[1].brake}
 
 
@@ -69,15 +69,15 @@ def test_every_row_is_the_checks_own():
         assert judged.rows == rows
 
 
-def test_the_ranking_is_by_verdict_then_mass_then_room():
+def test_the_ranking_is_by_verdict_then_mass_then_spare():
     for joint in ("inner", "lower", "wrist"):
         found = sized(joint=joint)
         keys = [(j.fails, j.mass) for j in found]
         assert keys == sorted(keys)
         for one, other in pairwise(found):
             if (one.fails, one.mass) == (other.fails, other.mass):
-                rooms = [[room(r) for r in j.by_room] for j in (one, other)]
-                assert rooms[0] >= rooms[1]
+                spares = [[spare(r) for r in j.by_spare] for j in (one, other)]
+                assert spares[0] >= spares[1]
 
 
 def test_what_does_not_pass_says_why_and_nothing_passes_without_rows():
@@ -227,7 +227,7 @@ def test_replanning_sizes_for_a_mission_that_the_fitted_drive_cannot_do(undersiz
     assert any(note.startswith("lower, as it is: the fitted drives cannot do the mission: mission quick") for note in notes)
     text = sizing_markdown("Drives", (choice,), notes)
     assert "- no motion with MST340B02 + CBG320160 (parallel, 80 V)" in text
-    assert "7.1 kg, finds no motion" in text
+    assert "7.1 kg, no motion found" in text
     assert {"FAIL: no motion"} == {line[-1] for line in ranking(choice)[1][1:]}
     assert sizing_json("quick", (choice,), notes)["choices"][0]["fitted"]["infeasible"] == choice.fitted.infeasible
 
@@ -265,12 +265,12 @@ def test_a_mission_without_a_motion_is_for_replanning_alone(undersized, adapt):
 def test_notes_say_whose_motion_the_drives_are_judged_on_and_on_what_ground():
     said = {adapt: sizing_notes((), adapt) for adapt in Adapt}
     for adapt in (Adapt.NOTHING, Adapt.RESCALE):
-        assert any("the motion that the boom as it is, with its fitted drives, was planned to make" in n for n in said[adapt])
-    assert any("a motion that was planned for it" in note for note in said[Adapt.REPLAN])
-    assert any(note.startswith("level ground") for note in said[Adapt.NOTHING])
+        assert any("the motion planned for the boom with its fitted drives" in n for n in said[adapt])
+    assert any("a motion planned for it" in note for note in said[Adapt.REPLAN])
+    assert any(note.startswith("the ground is level") for note in said[Adapt.NOTHING])
     on_slope = sizing_notes((), vehicle=load_case("slope"))
     assert any("slope: roll 8.5 deg" in note for note in on_slope)
-    assert not any(note.startswith("level ground") for note in on_slope)
+    assert not any(note.startswith("the ground is level") for note in on_slope)
 
 
 @pytest.mark.parametrize("adapt", [Adapt.NOTHING, Adapt.REPLAN])
@@ -294,15 +294,15 @@ def test_on_a_slope_the_rows_are_those_of_the_mission_on_the_slope(adapt):
 
 def test_a_voltage_that_motors_do_not_allow_is_said():
     assert too_high(CATALOGUE, (80.0, 165.0)) == ()
-    assert too_high(CATALOGUE, (80.0, 200.0, 200.0)) == ("200 V is above what every motor allows (165 V at most)",)
+    assert too_high(CATALOGUE, (80.0, 200.0, 200.0)) == ("200 V exceeds the limit of every motor (at most 165 V)",)
     weak = replace(CATALOGUE.motors["MST340B02"], name="WEAK", max_voltage=60.0)
     mixed = replace(CATALOGUE, motors={**CATALOGUE.motors, "WEAK": weak})
-    assert too_high(mixed, (80.0,)) == ("80 V is above what WEAK allows, on which it is not tried",)
+    assert too_high(mixed, (80.0,)) == ("80 V exceeds the limit of WEAK; it is not tried there",)
     open_ended = replace(CATALOGUE, motors={"ANY": replace(weak, max_voltage=None)})
     assert too_high(open_ended, (1000.0,)) == ()
     (none,) = choose({"x": BOOM}, MAIN, ("inner",), CATALOGUE, (200.0,))
     assert none.unmet
-    assert any("inner: NOT CHECKED, nothing of the catalogue is left" in note for note in sizing_notes((none,)))
+    assert any("inner: NOT CHECKED, no drive of the catalogue is left" in note for note in sizing_notes((none,)))
     (extension,) = choose({"x": BOOM}, MAIN, ("extension",), CATALOGUE, (200.0,))
     assert not extension.unmet
 
@@ -351,8 +351,8 @@ def test_tables_say_what_was_chosen():
     assert best[0][2] == "no FAIL; motor torque 102%"
     notes = sizing_notes(choices)
     assert any("gearbox input speed, gearbox average input speed, gearbox life" in note for note in notes)
-    assert any("motors differ by up to 10% from their sheet" in note for note in notes)
-    assert "extension: NOT CHECKED, the catalogue has nothing for it" in notes
+    assert any("a motor may differ by up to 10% from its datasheet" in note for note in notes)
+    assert "extension: NOT CHECKED, the catalogue has no drive for it" in notes
     text = sizing_markdown("Drives", choices, notes)
     assert "| as it is | inner | MST342C02" in text
     answer = sizing_json("field day", choices, notes)["choices"][0]
@@ -368,7 +368,7 @@ def test_tables_say_what_was_chosen():
         (lambda: candidates(BOOM, "inner", CATALOGUE, (0.0,)), "voltage is 0 V"),
         (lambda: candidates(BOOM, "inner", CATALOGUE, (np.nan,)), "voltage is nan"),
         (lambda: parse_variant(BOOM, "leg=3"), "unknown body 'leg'"),
-        (lambda: parse_variant(BOOM, "inner"), "'inner' is no mass"),
+        (lambda: parse_variant(BOOM, "inner"), "'inner' is not a mass"),
         (lambda: parse_variant(BOOM, "inner=x"), "'x' is not a mass in kg"),
         (lambda: parse_variant(BOOM, "payload=-1"), "payload is -1"),
     ],
