@@ -5,6 +5,7 @@ positions within the limits that reach the target, the one with the least cost.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,6 +53,8 @@ class FixedExtension:
 class LeastExtension:
     """The actuator is extended as little as possible. Cost: theta4 [m]."""
 
+    unit: ClassVar[str] = "m of extension"
+
     def __str__(self) -> str:
         return "least-extension"
 
@@ -63,6 +66,8 @@ class LeastExtension:
 @dataclass(frozen=True)
 class NearestHorizontal:
     """The actuator is as parallel to the ground as possible. Cost: |theta3 - pi| [rad]; less extension breaks a tie."""
+
+    unit: ClassVar[str] = "rad of elevation"
 
     def __str__(self) -> str:
         return "nearest-horizontal"
@@ -79,6 +84,8 @@ class LeastTorque:
     Cost: the largest |static torque| / (what the drive allows at rest) over the joints that have a drive. Joints without one
     do not count, because nobody knows what they bear.
     """
+
+    unit: ClassVar[str] = "of a drive's allowed torque"
 
     def __str__(self) -> str:
         return "least-torque"
@@ -117,6 +124,8 @@ class NearestPose:
             raise InputError(f"reference has shape {pose.shape}; it must be (5,)")
         return NearestPose(read_only(pose))
 
+    unit: ClassVar[str] = "of the squared distance"
+
     def __str__(self) -> str:
         return f"nearest={','.join(f'{x:.6g}' for x in self.pose)} (rad, m)"
 
@@ -133,6 +142,8 @@ class LargestMargin:
     The coupled limit counts with the range of theta3. Joints that target and pitch fix count too: they bound what can be had.
     """
 
+    unit: ClassVar[str] = "of a joint's range"
+
     def __str__(self) -> str:
         return "largest-margin"
 
@@ -143,10 +154,31 @@ class LargestMargin:
         return excess
 
 
+@dataclass(frozen=True)
+class LeastTime:
+    """Travel a line or an arc of the tip in the least time. Cost: the time under joint limits and drive torque at standstill.
+
+    The choice is made for the whole curve; a single target has no time.
+    """
+
+    unit: ClassVar[str] = "s"
+
+    def __str__(self) -> str:
+        return "least-time"
+
+    def cost(self, boom: Boom, q: Array) -> Array:
+        """Raise InputError: a joint position alone has no time.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError(f"constraint {self} chooses along a line or an arc of the tip; a single target has no time")
+
+
 _TIE = 1e-9  # [rad/m] above rounding, and below what anybody can measure
 
 ConstraintHold = ActuatorAngle | FixedExtension
-ChoiceHold = LeastExtension | NearestHorizontal | LeastTorque | NearestPose | LargestMargin
+ChoiceHold = LeastExtension | NearestHorizontal | LeastTorque | NearestPose | LargestMargin | LeastTime
 Hold = ConstraintHold | ChoiceHold
 
 

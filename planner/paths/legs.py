@@ -12,9 +12,11 @@ from boom_model.arrays import Array, checked
 from boom_model.boom import JOINTS
 from boom_model.kinematics.constraints import Hold
 from planner.paths.clearance import require_clear, require_path_clear
-from planner.paths.path import JointLine, Path, SplinePath, TipArc, TipLine, TipPath, follow, through
+from planner.paths.path import JointLine, Path, SplinePath, through
 from planner.paths.routing import detour
 from planner.paths.targets import Target, TipTarget, resolve
+from planner.paths.tip_curves import TipArc, TipLine
+from planner.paths.tip_path import TipPath, follow
 
 Along = Literal["joint", "line"] | ArrayLike
 """What leads a move: the joints, or the tip on a line or on an arc through a point."""

@@ -15,6 +15,7 @@ from boom_model import (
     InputError,
     LargestMargin,
     LeastExtension,
+    LeastTime,
     LeastTorque,
     NearestHorizontal,
     NearestPose,
@@ -25,7 +26,15 @@ from boom_model.arrays import Array, checked
 
 PITCHES = {"down": -np.pi / 2.0, "level": 0.0, "up": np.pi / 2.0}
 CHOICES = {
-    str(hold): hold for hold in (ActuatorHorizontal(), LeastExtension(), NearestHorizontal(), LeastTorque(), LargestMargin())
+    str(choice): choice
+    for choice in (
+        ActuatorHorizontal(),
+        LeastExtension(),
+        NearestHorizontal(),
+        LeastTorque(),
+        LargestMargin(),
+        LeastTime(),
+    )
 }
 HOLDS = f"{', '.join(CHOICES)}, actuator=DEG, extension=M, nearest=DEG,DEG,DEG,M,DEG"
 

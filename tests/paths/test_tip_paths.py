@@ -23,7 +23,8 @@ from boom_model.kinematics.constraints import (
 from boom_model.kinematics.forward import forward_kinematics
 from boom_model.kinematics.inverse import inverse_kinematics
 from planner import Profile, TipTarget, plan, sample
-from planner.paths.path import TipArc, TipLine, TipPath, follow
+from planner.paths.tip_curves import TipArc, TipLine
+from planner.paths.tip_path import TipPath, follow
 from planner.timing.path_limits import motor_limits, path_dynamics, rotors
 
 BOOM = Boom.load()
@@ -128,7 +129,7 @@ def test_a_constraint_is_held_all_along(hold):
 @pytest.mark.parametrize(("order", "tolerance"), [(1, 2e-9), (2, 1.5e-8), (3, 1e-6)])
 def test_derivatives_of_a_tip_path_are_its_differences(hold, curve, order, tolerance):
     path = follow(BOOM, curve, DOWN, hold)
-    s, h = np.linspace(0.01, 0.99, 197), 1e-5
+    s, h = np.linspace(0.01, 0.99, 197), 2e-6
     difference = (path(s + h, order - 1) - path(s - h, order - 1)) / (2 * h)
     exact = path(s, order)
     np.testing.assert_allclose(difference, exact, rtol=0, atol=tolerance * np.abs(exact).max())
@@ -217,7 +218,7 @@ def test_a_line_that_starts_out_of_reach_says_so():
 @pytest.mark.parametrize("y", [0.3, -0.3])
 def test_a_line_across_the_end_of_yaw_forces_a_flip(y):
     """Of 64 equal steps the 33rd is the first beyond y = 0 from below, and the 32nd, on it, is at 0 deg from above."""
-    with pytest.raises(InfeasibleError, match=r"forces a flip to another branch under hold horizontal at 5[01]\.") as caught:
+    with pytest.raises(InfeasibleError, match=r"forces a flip to another branch under constraint horizontal at 5[01]\.") as caught:
         follow(BOOM, line((1.4, y, 1.0), (1.4, -y, 1.0)), DOWN, ActuatorHorizontal())
     assert float(re.search(r"\(1.4, ([^,]+), 1\) m", str(caught.value))[1]) == pytest.approx(0.0, abs=0.6 / 64)
 

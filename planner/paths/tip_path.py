@@ -1,0 +1,199 @@
+"""Joint paths that follow a curve of the tip at constant pitch."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from boom_model import (
+    Boom,
+    ChoiceHold,
+    Hold,
+    InfeasibleError,
+    LeastExtension,
+    LeastTime,
+    forward_kinematics,
+    solve_branches,
+)
+from boom_model.arrays import Array, Mask, checked, scalar
+from planner.paths.redundancy import NODES, Departure, resolve, sides_of
+from planner.paths.targets import unreachable
+from planner.paths.tip_curves import TipCurve, TipLine
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+
+TIP_TOLERANCE = 1e-5
+"""How far [m] a spline may leave its line; a tenth of what a sweep is asked to keep."""
+
+_NODES = (64, 128, 256, 512, 1024, 2048)
+_CHECKS_PER_NODE = 8
+_BISECTIONS = 50
+_SAME = 1e-6  # [m, rad]
+_INSET = 1e-4 * np.array([0.0, 1.0, 1.0, 1.0, 1.0])  # [rad or m]; a target leaves no choice of yaw
+_FLIP = 0.25
+"""A step between neighbouring nodes of more than this, as a share of a joint's range, is a flip to another branch."""
+
+
+@dataclass(frozen=True, eq=False)
+class TipPath:
+    """Joint path that follows a curve of the tip at constant pitch: a quintic spline through exact inverse kinematics."""
+
+    curve: TipCurve
+    pitch: float
+    spline: "BSpline"
+    deviation: float
+    """Largest distance [m] of the tip from the curve, on a grid eight times as fine as the spline's nodes."""
+    departure: Departure | None = None
+    """How far the joints are from the constraint's own choice; None of a constraint that leaves no choice."""
+
+    def __call__(self, s: ArrayLike, order: int = 0) -> Array:
+        return np.asarray(self.spline(np.clip(s, 0.0, 1.0), order))
+
+    @property
+    def knots(self) -> Array:
+        return np.empty(0)  # of a quintic spline the fourth derivative is continuous
+
+    @property
+    def sentence(self) -> str:
+        """What a report says of it."""
+        kind = "line" if isinstance(self.curve, TipLine) else "arc"
+        followed = f"the tip follows a {kind} of {self.curve.length:.4g} m to within {self.deviation * 1e3:.3g} mm"
+        return followed if self.departure is None else f"{followed}; {self.departure.sentence}"
+
+
+def follow(
+    boom: Boom,
+    curve: TipCurve,
+    pitch: float,
+    constraint: Hold,
+    reference: ArrayLike | None = None,
+    tolerance: float = TIP_TOLERANCE,
+) -> TipPath:
+    """The joint path along a curve of the tip, on one branch from end to end.
+
+    The branch is the one nearest to `reference` at the start, and from node to node the one nearest to the last. Nodes are
+    doubled until the tip stays within `tolerance` of the curve between them.
+
+    Args:
+        pitch: of the end effector all along [rad].
+        constraint: applied at every node or, where it chooses, to the whole curve (`redundancy`).
+        reference: (5,); None is the middle of the joint ranges.
+        tolerance: [m]
+
+    Raises:
+        InputError: pitch is not finite.
+        InfeasibleError: the curve leaves the reach (where), forces a flip to another branch (where), or no spline within
+            2048 nodes keeps the tolerance (the hold's choice jumps or kinks).
+    """
+    pitch = scalar("pitch", pitch)
+    limits = boom.limits
+    start = (limits.lower + limits.upper) / 2.0 if reference is None else checked("reference", reference, 5)
+    if isinstance(constraint, ChoiceHold):
+        return _through_family(boom, curve, pitch, constraint, start, tolerance)
+
+    def nodes(s: Array) -> Array:
+        return _one_branch(boom, curve, pitch, constraint, s, start)
+
+    return _fitted(boom, curve, pitch, constraint, nodes, tolerance)
+
+
+def _fitted(
+    boom: Boom, curve: TipCurve, pitch: float, constraint: Hold, nodes: Callable[[Array], Array], tolerance: float
+) -> TipPath:
+    """The spline through exact joint positions `nodes(s)`, doubled until the tip stays on its curve between them."""
+    from scipy.interpolate import make_interp_spline
+
+    for count in _NODES:
+        s = np.linspace(0.0, 1.0, count + 1)
+        spline = make_interp_spline(s, nodes(s), k=5)
+        fine = np.linspace(0.0, 1.0, count * _CHECKS_PER_NODE + 1)
+        q = spline(fine)
+        deviation = float(np.linalg.norm(forward_kinematics(boom, q).position - curve(fine), axis=-1).max())
+        if deviation <= tolerance and boom.limits.hold(q).all():
+            return TipPath(curve, pitch, spline, deviation)
+    raise InfeasibleError(
+        f"no smooth joint path keeps the tip within {tolerance * 1e3:g} mm of its line under constraint {constraint}: "
+        f"{_NODES[-1]} nodes leave {deviation * 1e3:.3g} mm"
+    )
+
+
+def _through_family(
+    boom: Boom, curve: TipCurve, pitch: float, constraint: ChoiceHold, start: Array, tolerance: float
+) -> TipPath:
+    """The path of a constraint that chooses, resolved for the whole curve (`redundancy`)."""
+    planned = _inset(boom)
+    points = curve(np.linspace(0.0, 1.0, NODES))
+    begins = forward_kinematics(boom, start)
+    there = np.abs(begins.position - points[0]).max() < _SAME and abs(float(begins.pitch) - pitch) < _SAME
+    motion = resolve(sides_of(planned, points, pitch, start if there else None), constraint, start)
+    if motion is None:
+        raise InfeasibleError(_no_curve(boom, planned, curve, pitch, constraint))
+    path = _fitted(boom, curve, pitch, constraint, lambda s: motion(curve(s), s), tolerance)
+    return path if isinstance(constraint, LeastTime) else replace(path, departure=motion.departure(boom, constraint))
+
+
+def _no_curve(boom: Boom, planned: Boom, curve: TipCurve, pitch: float, constraint: ChoiceHold) -> str:
+    """Why no joint path within the limits follows a curve: it leaves the workspace, or no branch leads from end to end."""
+    s = np.linspace(0.0, 1.0, NODES)
+    any_member = LeastExtension()
+    for within in (boom, planned):
+        reached = np.asarray(solve_branches(within, curve(s), pitch, any_member).within_limits.any(axis=-1))
+        if not reached.all():
+            return _leaves(within, curve, pitch, any_member, s, reached)
+    furthest = max(side.furthest for side in sides_of(planned, curve(s), pitch))
+    at = ", ".join(f"{x:.4g}" for x in curve(s[furthest]))
+    return _flip(constraint, s[furthest], at)
+
+
+def _flip(constraint: Hold, s: float, at: str) -> str:
+    return f"the tip's line forces a flip to another branch under constraint {constraint} at {s:.1%}, ({at}) m"
+
+
+def _inset(boom: Boom) -> Boom:
+    """The boom with its position limits drawn in: where a choice leaves a limit that it kept to, its spline overshoots."""
+    lower, upper = boom.limits.lower + _INSET, boom.limits.upper - _INSET
+    return replace(boom, limits=replace(boom.limits, lower=lower, upper=upper, linkage=boom.limits.linkage + 2.0 * _INSET[2]))
+
+
+def _one_branch(boom: Boom, curve: TipCurve, pitch: float, constraint: Hold, s: Array, start: Array) -> Array:
+    """q (n, 5) at s (n,), each on the branch nearest to the one before: of all starts that go through, the nearest."""
+    found = solve_branches(boom, curve(s), pitch, constraint)
+    reached = np.asarray(found.within_limits.any(axis=-1))
+    if not reached.all():
+        raise InfeasibleError(_leaves(boom, curve, pitch, constraint, s, reached))
+    span = np.where(boom.limits.upper > boom.limits.lower, boom.limits.upper - boom.limits.lower, 1.0)
+    starts = found.q[0][found.within_limits[0]]
+    starts = starts[np.argsort(np.abs((starts - start) / span).max(axis=-1))]
+    broken = 0
+    for first in starts:
+        path, last = np.empty((len(s), 5)), first
+        for i, (q, allowed) in enumerate(zip(found.q, found.within_limits, strict=True)):
+            steps = np.where(allowed, np.abs((q - last) / span).max(axis=-1), np.inf)
+            best = int(np.argmin(steps))
+            if steps[best] > _FLIP:
+                broken = max(broken, i)
+                break
+            path[i] = last = q[best]
+        else:
+            return path
+    at = ", ".join(f"{x:.4g}" for x in curve(s[broken]))
+    raise InfeasibleError(
+        f"the tip's line forces a flip to another branch under constraint {constraint} at {s[broken]:.1%}, ({at}) m"
+    )
+
+
+def _leaves(boom: Boom, curve: TipCurve, pitch: float, constraint: Hold, s: Array, reached: Mask) -> str:
+    """Where a curve leaves the reach, by bisection beside its first node out of reach."""
+    out = int(np.argmin(reached))
+    if out == 0:
+        return f"the tip's line starts out of reach: {unreachable(boom, curve(s[0]), pitch, constraint)}"
+    inside, outside = float(s[out - 1]), float(s[out])
+    for _ in range(_BISECTIONS):
+        middle = (inside + outside) / 2.0
+        within = solve_branches(boom, curve(np.array(middle)), pitch, constraint).within_limits.any()
+        inside, outside = (middle, outside) if within else (inside, middle)
+    at = ", ".join(f"{x:.6g}" for x in curve(np.array(inside)))
+    return f"the tip's line leaves the reach at {inside:.2%}, ({at}) m: {unreachable(boom, curve(s[out]), pitch, constraint)}"
