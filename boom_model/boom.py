@@ -89,7 +89,7 @@ class Limits:
         coupled = q[..., 1:2] + self.linkage - q[..., 2:3]
         return np.concatenate([np.maximum(self.lower - q, q - self.upper), coupled], axis=-1)
 
-    def hold(self, q: ArrayLike) -> Mask:
+    def contain(self, q: ArrayLike) -> Mask:
         """Whether q (..., 5) is within every position limit, to LIMIT_TOLERANCE; bool of shape (...)."""
         return np.asarray((self.excess(q) <= LIMIT_TOLERANCE).all(axis=-1))
 

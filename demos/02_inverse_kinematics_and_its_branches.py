@@ -1,15 +1,15 @@
-"""One tip target, five joints: the hold makes the answer determinate, and each hold has branches of its own.
+"""One tip target, five joints: the constraint makes the answer determinate, and each constraint has branches of its own.
 
     python3 demos/02_inverse_kinematics_and_its_branches.py
 
 Learn: a target with a pitch leaves one freedom. A constraint takes it away and leaves up to four branches, each with the limits
-that it breaks; a hold that chooses looks over the whole family, and says how good its choice is.
+that it breaks; a constraint that chooses looks over the whole family, and says how good its choice is.
 """
 
 import numpy as np
 
 from boom_model import Boom, forward_kinematics, inverse_kinematics
-from planner import parse_hold
+from boom_model.kinematics.constraints import parse_constraint
 
 TARGET = (1.4, 0.0, 1.0)
 
@@ -17,8 +17,8 @@ TARGET = (1.4, 0.0, 1.0)
 def main() -> None:
     boom = Boom.load()
     for name in ("horizontal", "extension=0.25", "actuator=-20", "least-extension", "least-torque"):
-        found = inverse_kinematics(boom, TARGET, pitch=-np.pi / 2.0, hold=parse_hold(name))
-        print(f"hold {name}: {len(found.solutions)} branch(es)")
+        found = inverse_kinematics(boom, TARGET, pitch=-np.pi / 2.0, constraint=parse_constraint(name))
+        print(f"constraint {name}: {len(found.solutions)} branch(es)")
         for i, solution in enumerate(found.solutions):
             q = np.where([0, 0, 0, 1, 0], solution.q, np.degrees(solution.q))
             why = "within the limits" if solution.within_limits else "; ".join(solution.reasons)

@@ -2,8 +2,8 @@
 
     python3 demos/06_a_straight_sweep_over_the_plot.py [OUT.rrd]
 
-Learn: the tip keeps its line to a hundredth of a millimetre; what the sweep costs depends on the hold; a line that leaves the
-reach says where.
+Learn: the tip keeps its line to a hundredth of a millimetre; what the sweep costs depends on the constraint; a line
+that leaves the workspace says where.
 """
 
 import sys
@@ -17,10 +17,10 @@ START, GOAL = TipTarget((1.0, 1.7, 0.9)), TipTarget((-1.0, 1.7, 0.9))
 
 def main(out: str = "sweep.rrd") -> None:
     boom = Boom.load()
-    for hold in ("horizontal", "least-extension", "least-torque"):
-        move = plan(boom, START, GOAL, along="line", constraint=hold, profile="jerk-limited")
+    for constraint in ("horizontal", "least-extension", "least-torque"):
+        move = plan(boom, START, GOAL, along="line", constraint=constraint, profile="jerk-limited")
         peaks = ", ".join(f"{peak.joint} {peak.total:.0f} {peak.unit}" for peak in move.report.peaks[:3])
-        print(f"hold {hold}: {move.report.duration:.2f} s, {move.report.notes[0]}; largest torques {peaks}")
+        print(f"constraint {constraint}: {move.report.duration:.2f} s, {move.report.notes[0]}; largest torques {peaks}")
     write_recording(out, move)
     print(f"recording: {out}")
     try:

@@ -1,5 +1,6 @@
 """From targets to motions that have been checked, and to what people keep of them: reports, recordings, CSV."""
 
+from boom_model.kinematics.constraints import parse_constraint
 from planner.checks.certificate import Certificate, WorstRatio, certify
 from planner.checks.evaluation import Evaluation, evaluate
 from planner.checks.kinds import CheckKind
@@ -15,7 +16,7 @@ from planner.motion.planned import PlannedMotion
 from planner.motion.trajectory import Trajectory, read_csv, sample, write_csv
 from planner.move_spec import MoveSpec
 from planner.paths.path import JointLine, Path
-from planner.paths.targets import TipTarget, parse_hold, parse_pitch, parse_target
+from planner.paths.targets import TipTarget, parse_pitch, parse_target
 from planner.planning import Move, check, examine, plan, plan_motion, plan_move, torques
 from planner.reports.report import Report
 from planner.sizing.choice import Adapt, Choice, Judged, candidates, choose, size
@@ -71,7 +72,7 @@ __all__ = [
     "examine",
     "load_mission",
     "mjcf",
-    "parse_hold",
+    "parse_constraint",
     "parse_pitch",
     "parse_target",
     "plan",

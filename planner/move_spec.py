@@ -8,11 +8,11 @@ from numpy.typing import ArrayLike
 
 from boom_model import InputError
 from boom_model.arrays import scalar
-from boom_model.kinematics.constraints import Hold as Constraint
+from boom_model.kinematics.constraints import Constraint, parse_constraint
 from planner.motion.trajectory import STEP, check_size
 from planner.motion.vehicle import LEVEL, VehicleCase, load_case
 from planner.paths.legs import Along
-from planner.paths.targets import Target, parse_along, parse_hold, parse_pitch, parse_target
+from planner.paths.targets import Target, parse_along, parse_pitch, parse_target
 from planner.timing.profile import Cubic, TimingProfile
 from planner.timing.timing import Timing
 
@@ -93,7 +93,7 @@ class MoveSpec:
             goal=_target(goal),
             via=tuple(_target(target) for target in via),
             stop_at_via=stop_at_via and not passes,
-            constraint=parse_hold(constraint) if isinstance(constraint, str) else constraint,
+            constraint=parse_constraint(constraint) if isinstance(constraint, str) else constraint,
             pitch=parse_pitch(pitch) if isinstance(pitch, str) else None if pitch is None else scalar("pitch", pitch),
             along=parse_along(along) if isinstance(along, str) else np.asarray(along, dtype=float),
             profile=timing.profile,

@@ -14,7 +14,7 @@ from boom_model.arrays import Array
 from boom_model.boom import LOAD_UNITS
 from boom_model.drives.drive import drive_torque_limit
 from boom_model.dynamics.newton_euler import PayloadAs
-from boom_model.kinematics.constraints import Hold as Constraint
+from boom_model.kinematics.constraints import Constraint
 from planner.checks.certificate import certified
 from planner.checks.drives.duty import Duty
 from planner.checks.evaluation import Evaluation, at_samples, evaluate

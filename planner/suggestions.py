@@ -169,7 +169,7 @@ def _orders(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
     for name, moved_from, moved_to in (("first", a, b), ("last", b, a)):
         between = moved_from.copy()
         between[3] = moved_to[3]
-        if boom.limits.hold(between) and works(boom, replace(spec, via=(between,))):
+        if boom.limits.contain(between) and works(boom, replace(spec, via=(between,))):
             yield Suggestion("order", f"the extension {name}, by itself")
 
 

@@ -72,6 +72,6 @@ def random_pairs(boom: Boom, count: int, seed: int) -> list[Array]:
     rng, limits, found = np.random.default_rng(seed), boom.limits, []
     while len(found) < count:
         pair = rng.uniform(limits.lower, limits.upper, (2, 5))
-        if limits.hold(pair).all():
+        if limits.contain(pair).all():
             found.append(pair)
     return found

@@ -1,7 +1,7 @@
-"""Holds: the extra constraint that makes the inverse kinematics determinate.
+"""The extra constraint that makes the inverse kinematics determinate.
 
-A position and a pitch fix four of the five joints. A constraint hold fixes the fifth; a choice hold picks, among all joint
-positions within the limits that reach the target, the one with the least cost.
+A position and a pitch fix four of the five joints. A fixing constraint fixes the fifth. A choosing constraint takes, among all
+joint positions within the limits that reach the target, the one with the least cost.
 """
 
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from boom_model.boom import Boom
 from boom_model.drives.drive import drive_torque_limit
 from boom_model.dynamics.equations_of_motion import gravity_torque
 from boom_model.errors import InputError
+from boom_model.words import joint_position, number
 
 
 @dataclass(frozen=True)
@@ -99,7 +100,7 @@ class LeastTorque:
         limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
         driven = [i for i, limit in enumerate(limits) if limit is not None]
         if not driven:
-            raise InputError(f"hold {self}: no joint of {boom.name} has a drive to measure torques by")
+            raise InputError(f"constraint {self}: no joint of {boom.name} has a drive to measure torques by")
         allowed = np.array([float(limit) for limit in limits if limit is not None])
         ratio: Array = np.max(np.abs(gravity_torque(boom, q)[..., driven]) / allowed, axis=-1)
         return ratio
@@ -114,7 +115,7 @@ class NearestPose:
 
     @staticmethod
     def to(q: ArrayLike) -> "NearestPose":
-        """The hold of a joint position q (5,).
+        """The constraint of a joint position q (5,).
 
         Raises:
             InputError: not finite, or not (5,).
@@ -177,22 +178,54 @@ class LeastTime:
 
 _TIE = 1e-9  # [rad/m] above rounding, and below what anybody can measure
 
-ConstraintHold = ActuatorAngle | FixedExtension
-ChoiceHold = LeastExtension | NearestHorizontal | LeastTorque | NearestPose | LargestMargin | LeastTime
-Hold = ConstraintHold | ChoiceHold
+FixingConstraint = ActuatorAngle | FixedExtension
+ChoosingConstraint = LeastExtension | NearestHorizontal | LeastTorque | NearestPose | LargestMargin | LeastTime
+Constraint = FixingConstraint | ChoosingConstraint
 
 
-def measure(boom: Boom, hold: Hold, reference: ArrayLike | None = None) -> ChoiceHold:
-    """What the best of several branches has least of: a choice hold's own cost, else the distance to a reference pose.
+def measure(boom: Boom, constraint: Constraint, reference: ArrayLike | None = None) -> ChoosingConstraint:
+    """Return what the best branch has least of: a choosing constraint's own cost, else the distance to a reference pose.
 
     Raises:
         InputError: reference is not finite or not (5,).
     """
-    if isinstance(hold, ConstraintHold):
+    if isinstance(constraint, FixingConstraint):
         return NearestPose.to((boom.limits.lower + boom.limits.upper) / 2.0 if reference is None else reference)
-    return hold
+    return constraint
 
 
 def _spans(boom: Boom) -> Array:
     span = boom.limits.upper - boom.limits.lower
     return np.where(span > 0.0, span, 1.0)
+
+
+WORDS = {
+    str(constraint): constraint
+    for constraint in (
+        ActuatorHorizontal(),
+        LeastExtension(),
+        NearestHorizontal(),
+        LeastTorque(),
+        LargestMargin(),
+        LeastTime(),
+    )
+}
+CONSTRAINTS = f"{', '.join(WORDS)}, actuator=DEG, extension=M, nearest=DEG,DEG,DEG,M,DEG"
+
+
+def parse_constraint(text: str) -> Constraint:
+    """Return a constraint from its word; `actuator=DEG` is the actuator's elevation above the horizontal.
+
+    Raises:
+        InputError: no such constraint, or its value is not a finite number.
+    """
+    kind, equals, rest = text.partition("=")
+    if text in WORDS:
+        return WORDS[text]
+    if kind == "nearest" and equals:
+        return NearestPose.to(joint_position(text, rest))
+    if kind == "actuator" and equals:
+        return ActuatorAngle(float(np.radians(number("constraint actuator", rest, "degrees"))))
+    if kind == "extension" and equals:
+        return FixedExtension(number("constraint extension", rest, "metres"))
+    raise InputError(f"constraint {text!r} is not known; there are: {CONSTRAINTS}")

@@ -1,4 +1,4 @@
-"""All joint positions that put the tip at a target with a pitch, and the best of them under a choice hold.
+"""All joint positions that put the tip at a target with a pitch, and the best of them under a constraint that chooses.
 
 They are a one-parameter family, and theta2 is its parameter. With W = (F, G) of `closure` and V = W - L9 e(theta2),
 
@@ -18,7 +18,7 @@ import numpy as np
 from boom_model.arrays import Array, Mask
 from boom_model.boom import Boom
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension, turned_into_limits
-from boom_model.kinematics.constraints import ChoiceHold, LeastExtension, NearestHorizontal
+from boom_model.kinematics.constraints import ChoosingConstraint, LeastExtension, NearestHorizontal
 
 _SCAN = 64
 _REFINEMENTS = 60
@@ -46,20 +46,20 @@ def member(boom: Boom, targets: Targets, theta2: Array) -> Array:
     return turned_into_limits(boom, q)
 
 
-def best_member(boom: Boom, targets: Targets, hold: ChoiceHold) -> tuple[Array, Mask]:
+def best_member(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> tuple[Array, Mask]:
     """The member within the limits with the least cost, (n, 5), and whether there is one, (n,)."""
-    ends = _ends(boom, targets, hold)
+    ends = _ends(boom, targets, constraint)
     at_ends = member(boom, targets, ends)
-    best, cost = _least(boom, hold, at_ends, ends)
-    if not isinstance(hold, LeastExtension | NearestHorizontal):  # theirs are among the ends
-        best, cost = _inside(boom, targets, hold, ends, best, cost)
+    best, cost = _least(boom, constraint, at_ends, ends)
+    if not isinstance(constraint, LeastExtension | NearestHorizontal):  # theirs are among the ends
+        best, cost = _inside(boom, targets, constraint, ends, best, cost)
     exists = np.isfinite(cost)
     q = member(boom, targets, best[:, None])[:, 0]
     q[~exists] = np.nan
     return q, exists
 
 
-def _ends(boom: Boom, targets: Targets, hold: ChoiceHold) -> Array:
+def _ends(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> Array:
     """theta2 (n, k) in order, within its own limits: wherever a limit is met, and where a closed cost is stationary."""
     limits, g = boom.limits, boom.geometry
     _, F, G, phi = targets
@@ -67,9 +67,9 @@ def _ends(boom: Boom, targets: Targets, hold: ChoiceHold) -> Array:
     angles = [np.full_like(F, lower[2]), np.full_like(F, upper[2]), phi - lower[4], phi - upper[4]]
     deltas = [limits.linkage]
     points = [np.full_like(F, lower[1]), np.full_like(F, upper[1])]
-    if isinstance(hold, LeastExtension):
+    if isinstance(constraint, LeastExtension):
         points.append(np.arctan2(G, F))  # the inner link towards the wrist
-    if isinstance(hold, NearestHorizontal):
+    if isinstance(constraint, NearestHorizontal):
         angles.append(np.full_like(F, np.pi))
         deltas += [np.pi / 2.0, -np.pi / 2.0]  # where theta3 turns round
     for root in (1.0, -1.0):
@@ -93,41 +93,43 @@ def _at_linkage_angle(boom: Boom, F: Array, G: Array, delta: float, root: float)
     return theta2
 
 
-def _least(boom: Boom, hold: ChoiceHold, q: Array, theta2: Array) -> tuple[Array, Array]:
+def _least(boom: Boom, constraint: ChoosingConstraint, q: Array, theta2: Array) -> tuple[Array, Array]:
     """theta2 and cost (n,) of the cheapest of members (n, k, 5) within the limits; infinite where there is none."""
-    cost = _cost(boom, hold, q)
+    cost = _cost(boom, constraint, q)
     at = np.argmin(cost, axis=-1)[:, None]
     return np.take_along_axis(theta2, at, axis=-1)[:, 0], np.take_along_axis(cost, at, axis=-1)[:, 0]
 
 
-def _cost(boom: Boom, hold: ChoiceHold, q: Array) -> Array:
-    allowed = np.asarray(boom.limits.hold(q))  # NaN is outside every limit
+def _cost(boom: Boom, constraint: ChoosingConstraint, q: Array) -> Array:
+    allowed = np.asarray(boom.limits.contain(q))  # NaN is outside every limit
     cost = np.full(q.shape[:-1], np.inf)
-    cost[allowed] = hold.cost(boom, q[allowed])
+    cost[allowed] = constraint.cost(boom, q[allowed])
     return cost
 
 
-def _inside(boom: Boom, targets: Targets, hold: ChoiceHold, ends: Array, best: Array, cost: Array) -> tuple[Array, Array]:
+def _inside(
+    boom: Boom, targets: Targets, constraint: ChoosingConstraint, ends: Array, best: Array, cost: Array
+) -> tuple[Array, Array]:
     """The better of what the ends gave and the least cost inside each feasible interval."""
     middles = (ends[:, 1:] + ends[:, :-1]) / 2.0
-    feasible = np.isfinite(_cost(boom, hold, member(boom, targets, middles))) & (np.diff(ends, axis=-1) > 1e-9)
+    feasible = np.isfinite(_cost(boom, constraint, member(boom, targets, middles))) & (np.diff(ends, axis=-1) > 1e-9)
     row, interval = np.nonzero(feasible)
     if row.size == 0:
         return best, cost
     theirs = Targets(*(x[row] for x in targets))
     low, high = ends[row, interval], ends[row, interval + 1]
     scan = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, _SCAN + 1)
-    costs = _cost(boom, hold, member(boom, theirs, scan))
+    costs = _cost(boom, constraint, member(boom, theirs, scan))
     at = np.clip(np.argmin(costs, axis=-1), 1, _SCAN - 1)
     pick = np.arange(row.size)
     a, b = scan[pick, at - 1], scan[pick, at + 1]
     for _ in range(_REFINEMENTS):  # golden section, on all intervals at once
         c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
-        values = _cost(boom, hold, member(boom, theirs, np.stack([c, d], axis=-1)))
+        values = _cost(boom, constraint, member(boom, theirs, np.stack([c, d], axis=-1)))
         left = values[:, 0] <= values[:, 1]
         a, b = np.where(left, a, c), np.where(left, d, b)
     found = ((a + b) / 2.0)[:, None]
-    values = _cost(boom, hold, member(boom, theirs, found))[:, 0]
+    values = _cost(boom, constraint, member(boom, theirs, found))[:, 0]
     order = np.argsort(values)[::-1]  # the least of a row is written last
     better = order[values[order] < cost[row[order]]]
     best, cost = best.copy(), cost.copy()

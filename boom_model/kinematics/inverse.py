@@ -1,4 +1,4 @@
-"""Inverse kinematics in closed form: a tip position, a pitch and a hold give every branch."""
+"""Inverse kinematics in closed form: a tip position, a pitch and a constraint give every branch."""
 
 from dataclasses import dataclass
 
@@ -12,28 +12,28 @@ from boom_model.dynamics.equations_of_motion import gravity_torque
 from boom_model.errors import InfeasibleError, InputError
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension, turned_into_limits
 from boom_model.kinematics.constraints import (
-    ActuatorHorizontal,
-    ChoiceHold,
-    ConstraintHold,
+    ChoosingConstraint,
+    Constraint,
     FixedExtension,
-    Hold,
+    FixingConstraint,
     LargestMargin,
     measure,
+    parse_constraint,
 )
 from boom_model.kinematics.families import Targets, best_member
 
 _PITCHES = 360
 _REFINEMENTS = 40
 _SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
-_CHUNK = 20_000  # targets at once under a choice hold, whose scan takes some 10 kB a target
+_CHUNK = 20_000  # targets at once under a choosing constraint, whose scan takes some 10 kB a target
 
 
 @dataclass(frozen=True, eq=False)
 class Branches:
     """Every branch for a batch of targets, in the last branch axis.
 
-    A constraint hold has four: two of the base times two of the closure. A choice hold has two, of the base: the best joint
-    position within the limits on either side.
+    A fixing constraint has four: two of the base times two of the closure. A choosing constraint has two, of the base: the best
+    joint position within the limits on either side.
     """
 
     q: Array
@@ -71,18 +71,18 @@ def inverse_kinematics(
     boom: Boom,
     position: ArrayLike,
     pitch: float | None = -np.pi / 2.0,
-    hold: Hold | None = None,
+    constraint: Constraint | str = "horizontal",
     reference: ArrayLike | None = None,
 ) -> Solutions:
-    """Every branch that puts the tip at a position with a pitch, under a hold.
+    """Every branch that puts the tip at a position with a pitch, under a constraint.
 
     Args:
         position: (3,) of the tip in frame 1 [m].
         pitch: elevation of the end effector above the boom's own forward horizontal [rad]; -pi/2 faces down. None leaves it
-            free: the hold chooses the one with its least cost, a constraint hold the one with the largest margin to the limits.
-        hold: the extra constraint, or the choice; None holds the actuator horizontal.
+            free: a choosing constraint takes the pitch of least cost, a fixing one that of the largest margin to the limits.
+        constraint: the extra constraint, or its word ("horizontal", "extension=0.25", "least-torque", ...).
         reference: (5,) joint position that the best branch is nearest to, the distance of each joint measured as a share of
-            its range; None is the middle of the ranges. A choice hold has its own measure, its cost.
+            its range; None is the middle of the ranges. A choosing constraint has its own measure, its cost.
 
     Raises:
         InputError: an input is not finite or of the wrong shape. An unreachable target is no error: no solutions.
@@ -91,23 +91,27 @@ def inverse_kinematics(
     >>> len(found.solutions), [round(float(x), 3) for x in found.solutions[found.best].q]
     (4, [0.0, 1.093, 3.142, 0.15, 0.0])
     """
-    hold = ActuatorHorizontal() if hold is None else hold
+    constraint = parse_constraint(constraint) if isinstance(constraint, str) else constraint
     position = checked("position", position)
     if position.shape != (3,):
         raise InputError(f"position has shape {position.shape}; it must be (3,)")
     # Whole turns are taken off first, because their digits would be missing in the joints' angles.
-    pitch = _free_pitch(boom, position, hold) if pitch is None else float(np.fmod(scalar("pitch", pitch), 2.0 * np.pi))
-    found = solve_branches(boom, position, pitch, hold)
+    pitch = _free_pitch(boom, position, constraint) if pitch is None else float(np.fmod(scalar("pitch", pitch), 2.0 * np.pi))
+    found = solve_branches(boom, position, pitch, constraint)
     free = not position[:2].any()
     note = ("the target is on the yaw axis: yaw is free, 0 is chosen",) if free else ()
     solutions = tuple(_solution(boom, q, note) for q in found.q[found.exists])
-    return Solutions(solutions, _best(boom, solutions, hold, reference), pitch)
+    return Solutions(solutions, _best(boom, solutions, constraint, reference), pitch)
 
 
 def inverse_kinematics_of_pose(
-    boom: Boom, T: ArrayLike, hold: Hold | None = None, reference: ArrayLike | None = None, tolerance: float = 1e-6
+    boom: Boom,
+    T: ArrayLike,
+    constraint: Constraint | str = "horizontal",
+    reference: ArrayLike | None = None,
+    tolerance: float = 1e-6,
 ) -> Solutions:
-    """Every branch that puts frame 11 at a homogeneous transform T_1_11 (4, 4) (thesis, eq. 2.17), under a hold.
+    """Every branch that puts frame 11 at a homogeneous transform T_1_11 (4, 4) (thesis, eq. 2.17), under a constraint.
 
     Five joints cannot have every orientation: the wrist's axis z stays horizontal, and the tip in the arm's plane across it.
 
@@ -137,36 +141,36 @@ def inverse_kinematics_of_pose(
             f"by {abs(beside):.4g} m"
         )
     pitch = float(np.arctan2(R[2, 0], R[0, 0] * np.cos(yaw) + R[1, 0] * np.sin(yaw)))
-    hold = ActuatorHorizontal() if hold is None else hold
+    constraint = parse_constraint(constraint) if isinstance(constraint, str) else constraint
     ahead = float(position[0] * np.cos(yaw) + position[1] * np.sin(yaw))  # in the arm's plane; negative behind the base
-    found = solve_branches(boom, (abs(ahead), 0.0, position[2]), pitch, hold)
+    found = solve_branches(boom, (abs(ahead), 0.0, position[2]), pitch, constraint)
     side = slice(0, len(found.q) // 2) if ahead >= 0.0 else slice(len(found.q) // 2, None)
     q = found.q[side][found.exists[side]]
     q[:, 0] = yaw
     solutions = tuple(_solution(boom, branch) for branch in turned_into_limits(boom, q))
-    return Solutions(solutions, _best(boom, solutions, hold, reference), pitch)
+    return Solutions(solutions, _best(boom, solutions, constraint, reference), pitch)
 
 
 def _solution(boom: Boom, q: Array, note: tuple[str, ...] = ()) -> Solution:
-    return Solution(read_only(q), bool(boom.limits.hold(q)), (*note, *boom.limits.reasons(q), *_overloads(boom, q)))
+    return Solution(read_only(q), bool(boom.limits.contain(q)), (*note, *boom.limits.reasons(q), *_overloads(boom, q)))
 
 
 def _overloads(boom: Boom, q: Array) -> list[str]:
     held = np.abs(gravity_torque(boom, q))
     limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
     return [
-        f"{joint} must hold {torque:.4g} Nm, and its drive allows {float(limit):.4g} Nm"
+        f"{joint} must constraint {torque:.4g} Nm, and its drive allows {float(limit):.4g} Nm"
         for joint, torque, limit in zip(JOINTS, held, limits, strict=True)
         if limit is not None and torque > limit
     ]
 
 
-def _free_pitch(boom: Boom, position: Array, hold: Hold) -> float:
+def _free_pitch(boom: Boom, position: Array, constraint: Constraint) -> float:
     """The pitch with the least cost, by a scan of the whole turn and golden section; straight down where none is reachable."""
-    chooses = LargestMargin() if isinstance(hold, ConstraintHold) else hold
+    chooses = LargestMargin() if isinstance(constraint, FixingConstraint) else constraint
 
     def cost(pitch: Array) -> Array:
-        found = solve_branches(boom, position, pitch, hold)
+        found = solve_branches(boom, position, pitch, constraint)
         values = np.full(found.within_limits.shape, np.inf)
         values[found.within_limits] = chooses.cost(boom, found.q[found.within_limits])
         least: Array = values.min(axis=-1)
@@ -187,29 +191,29 @@ def _free_pitch(boom: Boom, position: Array, hold: Hold) -> float:
     return refined if cost(np.array([refined]))[0] <= costs[best] else middle
 
 
-def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, hold: Hold) -> Branches:
-    """Every branch for a batch of targets under one hold.
+def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, constraint: Constraint) -> Branches:
+    """Every branch for a batch of targets under one constraint.
 
     Args:
         position: (..., 3) of the tip in frame 1 [m].
         pitch: (...) [rad].
-        hold: the extra constraint, or the choice among all joint positions within the limits.
+        constraint: the extra constraint, or the choice among all joint positions within the limits.
 
     Raises:
         InputError: an input is not finite or of the wrong shape.
     """
-    if not isinstance(hold, Hold):
-        raise InputError(f"hold is {hold!r}; it must be one of the holds of boom_model")
+    if not isinstance(constraint, Constraint):
+        raise InputError(f"constraint is {constraint!r}; it must be one of the constraints of boom_model")
     position, pitch = checked("position", position, 3) + 0.0, checked("pitch", pitch)  # + 0.0 takes the sign off a zero
     try:
         x, y, z, pitch = np.broadcast_arrays(*np.moveaxis(position, -1, 0), pitch)
     except ValueError:
         raise InputError(f"shapes do not match: position {position.shape}, pitch {pitch.shape}") from None
     with np.errstate(over="ignore", invalid="ignore"):  # an absurdly far target is out of reach, not an error
-        return _branches(boom, x, y, z, pitch, hold)
+        return _branches(boom, x, y, z, pitch, constraint)
 
 
-def _branches(boom: Boom, x: Array, y: Array, z: Array, pitch: Array, hold: Hold) -> Branches:
+def _branches(boom: Boom, x: Array, y: Array, z: Array, pitch: Array, constraint: Constraint) -> Branches:
     side = np.array([1.0, -1.0])
     g, radius = boom.geometry, np.hypot(x, y)[..., None]
     targets = Targets(
@@ -219,22 +223,22 @@ def _branches(boom: Boom, x: Array, y: Array, z: Array, pitch: Array, hold: Hold
         phi=np.repeat((pitch - np.pi / 2.0)[..., None], 2, axis=-1),
     )
     distinct = (side > 0.0) | (radius > 0.0)
-    if isinstance(hold, ConstraintHold):
-        q, exists = _constrained(boom, targets, hold, distinct)
+    if isinstance(constraint, FixingConstraint):
+        q, exists = _constrained(boom, targets, constraint, distinct)
     else:
-        q, exists = _chosen(boom, targets, hold, distinct)
-    return Branches(q, exists, exists & boom.limits.hold(q))
+        q, exists = _chosen(boom, targets, constraint, distinct)
+    return Branches(q, exists, exists & boom.limits.contain(q))
 
 
-def _constrained(boom: Boom, targets: Targets, hold: ConstraintHold, distinct: Mask) -> tuple[Array, Mask]:
+def _constrained(boom: Boom, targets: Targets, constraint: FixingConstraint, distinct: Mask) -> tuple[Array, Mask]:
     """q (..., 4, 5) and existence (..., 4) for targets (..., 2): both roots of either side."""
     theta1, F, G, phi = (np.repeat(x, 2, axis=-1) for x in targets)
     root = np.array([1.0, -1.0, 1.0, -1.0])
-    if isinstance(hold, FixedExtension):
-        rho = np.full_like(F, boom.geometry.L7 + scalar("extension", hold.extension))
+    if isinstance(constraint, FixedExtension):
+        rho = np.full_like(F, boom.geometry.L7 + scalar("extension", constraint.extension))
         closure = closed_by_extension(boom, rho, F, G, root)
     else:
-        closure = closed_by_angle(boom, np.full_like(F, np.pi + scalar("elevation", hold.elevation)), F, G, root)
+        closure = closed_by_angle(boom, np.full_like(F, np.pi + scalar("elevation", constraint.elevation)), F, G, root)
     exists = closure.exists & np.repeat(distinct, 2, axis=-1)
     extension = closure.rho - boom.geometry.L7
     q = np.stack([theta1, closure.theta2, closure.theta3, extension, phi - closure.theta3], axis=-1)
@@ -242,20 +246,20 @@ def _constrained(boom: Boom, targets: Targets, hold: ConstraintHold, distinct: M
     return turned_into_limits(boom, q), exists
 
 
-def _chosen(boom: Boom, targets: Targets, hold: ChoiceHold, distinct: Mask) -> tuple[Array, Mask]:
+def _chosen(boom: Boom, targets: Targets, constraint: ChoosingConstraint, distinct: Mask) -> tuple[Array, Mask]:
     """q (..., 2, 5) and existence (..., 2) for targets (..., 2)."""
     shape = targets.F.shape
     flat = Targets(*(np.reshape(x, -1) for x in targets))
     q, exists = np.empty((flat.F.size, 5)), np.empty(flat.F.size, dtype=bool)
     for start in range(0, flat.F.size, _CHUNK):
         part = slice(start, start + _CHUNK)
-        q[part], exists[part] = best_member(boom, Targets(*(x[part] for x in flat)), hold)
+        q[part], exists[part] = best_member(boom, Targets(*(x[part] for x in flat)), constraint)
     exists &= np.broadcast_to(distinct, shape).reshape(-1)
     q[~exists] = np.nan
     return q.reshape(*shape, 5), exists.reshape(shape)
 
 
-def _best(boom: Boom, solutions: tuple[Solution, ...], hold: Hold, reference: ArrayLike | None) -> int | None:
+def _best(boom: Boom, solutions: tuple[Solution, ...], constraint: Constraint, reference: ArrayLike | None) -> int | None:
     allowed = [i for i, s in enumerate(solutions) if s.within_limits]
-    least_of = measure(boom, hold, reference)
+    least_of = measure(boom, constraint, reference)
     return min(allowed, key=lambda i: float(least_of.cost(boom, solutions[i].q)), default=None)

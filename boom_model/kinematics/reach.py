@@ -9,7 +9,7 @@ from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.boom import Boom
 from boom_model.drives.drive import drive_torque_limit
 from boom_model.errors import InputError
-from boom_model.kinematics.constraints import FixedExtension, Hold, LeastTorque, measure
+from boom_model.kinematics.constraints import Constraint, FixedExtension, LeastTorque, measure
 from boom_model.kinematics.inverse import solve_branches
 
 _SAMPLES = 4001
@@ -33,7 +33,7 @@ class NearestReachable:
     """False if no point of the line is reachable within the limits; this one then violates them."""
 
 
-def nearest_reachable(boom: Boom, position: ArrayLike, pitch: float, hold: Hold) -> NearestReachable | None:
+def nearest_reachable(boom: Boom, position: ArrayLike, pitch: float, constraint: Constraint) -> NearestReachable | None:
     """Return the reachable point nearest to `position` on its line to the base, or None.
 
     The line is scanned in steps of about a millimetre, and the boundary is found by bisection. A
@@ -52,25 +52,25 @@ def nearest_reachable(boom: Boom, position: ArrayLike, pitch: float, hold: Hold)
     if length == 0.0:
         return None
     g, limits = boom.geometry, boom.limits
-    extensions = [limits.lower[3], limits.upper[3], hold.extension if isinstance(hold, FixedExtension) else 0.0]
+    extensions = [limits.lower[3], limits.upper[3], constraint.extension if isinstance(constraint, FixedExtension) else 0.0]
     outermost = abs(g.L1) + abs(g.L2) + g.L9 + abs(g.L6) + g.L7 + g.L8 + float(np.abs(extensions).max())
     shares = np.linspace(0.0, outermost / length, _SAMPLES)
-    branches = solve_branches(boom, shares[:, None] * position, pitch, hold)
+    branches = solve_branches(boom, shares[:, None] * position, pitch, constraint)
     for reached, within in ((branches.within_limits, True), (branches.exists, False)):
         usable = np.flatnonzero(reached.any(axis=-1))
         if usable.size:
             inside = float(shares[usable[np.argmin(np.abs(shares[usable] - 1.0))]])
-            share = _boundary(boom, position, pitch, hold, inside, within)
+            share = _boundary(boom, position, pitch, constraint, inside, within)
             return NearestReachable(read_only(share * position), abs(1.0 - share) * length, within)
     return None
 
 
-def _boundary(boom: Boom, position: Array, pitch: float, hold: Hold, inside: float, within: bool) -> float:
+def _boundary(boom: Boom, position: Array, pitch: float, constraint: Constraint, inside: float, within: bool) -> float:
     """Return the share nearest to 1 that is reachable, between a reachable share and the target."""
     outside = 1.0
     for _ in range(_BISECTIONS):
         middle = (inside + outside) / 2.0
-        found = solve_branches(boom, middle * position, pitch, hold)
+        found = solve_branches(boom, middle * position, pitch, constraint)
         reachable = (found.within_limits if within else found.exists).any()
         inside, outside = (middle, outside) if reachable else (inside, middle)
     return inside
@@ -80,7 +80,7 @@ def _boundary(boom: Boom, position: Array, pitch: float, hold: Hold, inside: flo
 class ReachMap:
     """Reach of the tip in the vertical plane y = 0 of frame 1 with torque margins, cell by cell."""
 
-    hold: Hold
+    constraint: Constraint
     pitch: float
     """[rad]"""
     r: Array
@@ -110,7 +110,7 @@ class ReachMap:
 
 
 def reach_map(
-    boom: Boom, hold: Hold, pitch: float = -np.pi / 2.0, r: ArrayLike | None = None, z: ArrayLike | None = None
+    boom: Boom, constraint: Constraint, pitch: float = -np.pi / 2.0, r: ArrayLike | None = None, z: ArrayLike | None = None
 ) -> ReachMap:
     """Map the reach in the arm's vertical plane for one constraint and pitch.
 
@@ -120,7 +120,7 @@ def reach_map(
 
     Args:
         boom: the boom.
-        hold: the constraint that determines the redundant joint.
+        constraint: the constraint that determines the redundant joint.
         pitch: elevation of the end effector above the boom's own forward horizontal [rad]; -pi/2
             faces down.
         r: (n,) ascending [m]. None covers all that any constraint reaches within the limits, in
@@ -128,7 +128,7 @@ def reach_map(
         z: (m,) likewise.
 
     Raises:
-        InputError: pitch, r or z is not finite, r or z is not an ascending vector, or hold is not a
+        InputError: pitch, r or z is not finite, r or z is not an ascending vector, or constraint is not a
             constraint.
     """
     pitch = scalar("pitch", pitch)
@@ -137,9 +137,9 @@ def reach_map(
         for name, given, grid in zip("rz", (r, z), _default_grid(boom, pitch), strict=True)
     )
     x, height = np.meshgrid(r, z)
-    found = solve_branches(boom, np.stack([x, np.zeros_like(x), height], axis=-1), pitch, hold)
+    found = solve_branches(boom, np.stack([x, np.zeros_like(x), height], axis=-1), pitch, constraint)
     cost = np.full(found.within_limits.shape, np.inf)
-    cost[found.within_limits] = measure(boom, hold).cost(boom, found.q[found.within_limits])
+    cost[found.within_limits] = measure(boom, constraint).cost(boom, found.q[found.within_limits])
     best = np.argmin(cost, axis=-1)[..., None]
     q = np.take_along_axis(found.q, best[..., None], axis=-2)[..., 0, :]
     within, exists = (np.asarray(mask.any(axis=-1)) for mask in (found.within_limits, found.exists))
@@ -148,7 +148,7 @@ def reach_map(
     if any(drive is not None and drive_torque_limit(drive, 0.0) is not None for drive in boom.drives):
         margin[within] = 1.0 - LeastTorque().cost(boom, q[within])
     exists.flags.writeable = within.flags.writeable = False
-    return ReachMap(hold, pitch, r, z, exists, within, read_only(q), read_only(margin))
+    return ReachMap(constraint, pitch, r, z, exists, within, read_only(q), read_only(margin))
 
 
 def _rising(name: str, values: ArrayLike) -> Array:

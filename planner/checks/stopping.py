@@ -217,6 +217,6 @@ def _kept(boom: Boom, motions: list[Motion | None], base: BaseMotion | None) -> 
     tau = inverse_dynamics(boom, q, qd, qdd, base=base, friction=True, reactions=False).tau
     jerk = qddd if all(motion.law.jerk_limited for motion in motions if motion is not None) else None
     ratio = np.maximum.reduce([load_ratio(boom, tau, qd, qdd), *rate_ratios(boom, qd, qdd, jerk).values()])
-    ratio = np.where(boom.limits.hold(q)[:, None], ratio, np.inf)
+    ratio = np.where(boom.limits.contain(q)[:, None], ratio, np.inf)
     kept[there] = np.maximum.reduceat(ratio.max(axis=-1), starts) <= 1.0 + RATIO_TOLERANCE
     return kept

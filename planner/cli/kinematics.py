@@ -6,9 +6,10 @@ import click
 import numpy as np
 
 from boom_model import InfeasibleError, InputError, inverse_kinematics
+from boom_model.kinematics.constraints import parse_constraint
 from planner.cli.options import boom_option, hold_option, json_option, load_boom, payload_option, pitch_option
 from planner.cli.printing import new_console, new_table, print_files, print_json
-from planner.paths.targets import parse_hold, parse_pitch, unreachable
+from planner.paths.targets import parse_pitch, unreachable
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
@@ -28,7 +29,7 @@ def ik(x: float, y: float, z: float, pitch: str, hold: str, payload: float | Non
       boom ik 1.4 0 1.0 --pitch down --hold extension=0.25
     """
     boom = load_boom(boom_file, payload)
-    angle, held, position = parse_pitch(pitch), parse_hold(hold), (x, y, z)
+    angle, held, position = parse_pitch(pitch), parse_constraint(hold), (x, y, z)
     found = inverse_kinematics(boom, position, angle, held)
     reason = None if found.best is not None else unreachable(boom, position, angle, held)
     if as_json:
@@ -75,7 +76,7 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
 
     if not out.endswith((".png", ".rrd")):
         raise InputError(f"{out}: a reach map is written as .png or .rrd")
-    boom, angle, held = load_boom(boom_file, payload), parse_pitch(pitch), parse_hold(hold)
+    boom, angle, held = load_boom(boom_file, payload), parse_pitch(pitch), parse_constraint(hold)
     if angle is None:
         raise InputError("pitch free: a reach map is drawn for one pitch")
     found = reach_map(boom, held, angle)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boom_model import Boom, InputError
-from planner.paths.targets import HOLDS
+from boom_model.kinematics.constraints import CONSTRAINTS
 
 if TYPE_CHECKING:
     from planner.motion.vehicle import VehicleCase
@@ -55,7 +55,7 @@ hold_option = click.option(
     default="horizontal",
     show_default=True,
     metavar="HOLD",
-    help=f"Extra constraint of a tip target: {HOLDS}.",
+    help=f"Extra constraint of a tip target: {CONSTRAINTS}.",
 )
 
 

@@ -18,13 +18,14 @@ from pydantic import Field, model_validator
 from boom_model import Basis, Boom, InfeasibleError, InputError, Origin, Sourced, forward_kinematics
 from boom_model.arrays import Array, read_only
 from boom_model.dynamics.newton_euler import PayloadAs
+from boom_model.kinematics.constraints import parse_constraint
 from boom_model.toml_file import Positive, Table, read_toml
 from planner.checks.drives.duty import Duty, trapezoid_weights
 from planner.files import named_file
 from planner.motion.trajectory import STEP, Trajectory
 from planner.motion.vehicle import LEVEL, VehicleCase
 from planner.move_spec import MoveSpec
-from planner.paths.targets import TipTarget, parse_hold, parse_joint_velocity, parse_pitch, parse_target, resolve
+from planner.paths.targets import TipTarget, parse_joint_velocity, parse_pitch, parse_target, resolve
 from planner.planning import check, plan_motion
 from planner.progress import Track
 from planner.reports.report import Report
@@ -230,7 +231,7 @@ def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase = LEVEL, step:
     """
     check_steady(vehicle)
     table = mission.table
-    q = resolve(boom, parse_target(table.start), parse_pitch(table.pitch), parse_hold(table.hold))
+    q = resolve(boom, parse_target(table.start), parse_pitch(table.pitch), parse_constraint(table.hold))
     start, legs, known, order, notes = q, [], {}, [], []
     steps = list(islice(_expanded(table.steps, "steps"), _MOST_STEPS + 1))
     if len(steps) > _MOST_STEPS:

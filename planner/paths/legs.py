@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from boom_model import Boom, InputError
 from boom_model.arrays import Array, checked
 from boom_model.boom import JOINTS
-from boom_model.kinematics.constraints import Hold
+from boom_model.kinematics.constraints import Constraint
 from planner.paths.clearance import require_clear, require_path_clear
 from planner.paths.path import JointLine, Path, SplinePath, through
 from planner.paths.routing import detour
@@ -26,7 +26,7 @@ def legs(
     boom: Boom,
     targets: Sequence[Target],
     pitch: float | None,
-    hold: Hold,
+    constraint: Constraint,
     along: Along,
     stops: bool,
     reference: ArrayLike | None = None,
@@ -45,11 +45,11 @@ def legs(
         InfeasibleError: a target or a path is out of reach, outside the limits or too near to a shape.
     """
     if isinstance(along, str) and along == "joint":
-        paths, notes = _joint_paths(boom, targets, pitch, hold, stops)
+        paths, notes = _joint_paths(boom, targets, pitch, constraint, stops)
     else:
         if not stops:
             raise InputError("a move through targets without a stop is led by the joints, not by a line or an arc of the tip")
-        paths, notes = _tip_paths(boom, targets, pitch, hold, along, reference), ()
+        paths, notes = _tip_paths(boom, targets, pitch, constraint, along, reference), ()
     for path in paths:
         if not isinstance(path, JointLine):  # a straight move is on a way that has been found clear
             require_path_clear(boom, path)
@@ -57,11 +57,11 @@ def legs(
 
 
 def _joint_paths(
-    boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, stops: bool
+    boom: Boom, targets: Sequence[Target], pitch: float | None, constraint: Constraint, stops: bool
 ) -> tuple[list[Path], tuple[str, ...]]:
     found: list[Array] = []
     for target in targets:
-        found.append(resolve(boom, target, pitch, hold, reference=found[-1] if found else None))
+        found.append(resolve(boom, target, pitch, constraint, reference=found[-1] if found else None))
         require_clear(boom, found[-1], target if isinstance(target, str) else f"target {len(found)}")
     places = [found[0], *(b for a, b in pairwise(found) if not np.array_equal(a, b))]
     if not stops and len(places) > 2:
@@ -76,7 +76,12 @@ def _joint_paths(
 
 
 def _tip_paths(
-    boom: Boom, targets: Sequence[Target], pitch: float | None, hold: Hold, along: Along, reference: ArrayLike | None
+    boom: Boom,
+    targets: Sequence[Target],
+    pitch: float | None,
+    constraint: Constraint,
+    along: Along,
+    reference: ArrayLike | None,
 ) -> list[Path]:
     if isinstance(along, str) and along != "line":
         raise InputError(f"along is {along!r}; it must be 'joint', 'line' or a point of an arc")
@@ -90,7 +95,7 @@ def _tip_paths(
         if np.array_equal(a, b):
             continue
         curve = TipLine(a, b) if isinstance(along, str) else TipArc.through(a, along, b)
-        path = follow(boom, curve, pitch, hold, reference=last)
+        path = follow(boom, curve, pitch, constraint, reference=last)
         paths.append(path)
         last = path(1.0)
     return paths

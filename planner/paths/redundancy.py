@@ -26,7 +26,7 @@ from boom_model import Boom, inverse_dynamics
 from boom_model.arrays import Array, Mask
 from boom_model.drives.drive import drive_inertia, drive_torque_limit
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension
-from boom_model.kinematics.constraints import ChoiceHold, LeastTime
+from boom_model.kinematics.constraints import ChoosingConstraint, LeastTime
 from boom_model.kinematics.families import Targets, best_member, member
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ class Side:
     @cached_property
     def allowed(self) -> Mask:
         """(NODES, _GRID); nothing is beyond a jump of the yaw from one end of its range to the other."""
-        allowed = np.array(self.boom.limits.hold(self.members))
+        allowed = np.array(self.boom.limits.contain(self.members))
         yaw = self.members[:, 0, 0] if not np.isnan(self.members[:, 0, 0]).any() else np.nanmin(self.members[..., 0], axis=-1)
         jumps = np.flatnonzero(np.abs(np.diff(yaw)) > np.pi)
         if jumps.size:
@@ -116,7 +116,7 @@ class Side:
         """Joint positions (NODES, 5) at theta2 (NODES,)."""
         return self.at(theta2[:, None])[:, 0]
 
-    def connected(self, constraint: ChoiceHold | None) -> Array | None:
+    def connected(self, constraint: ChoosingConstraint | None) -> Array | None:
         """The curve (NODES,) of least cost by dynamic programming; None where no connected one exists."""
         allowed, q = self.allowed, self.members
         if not allowed.any(axis=-1).all():
@@ -174,7 +174,7 @@ class Side:
             open_end = ~np.isfinite(beyond)
             for _ in range(_BISECTIONS):
                 middle = (inside + outside) / 2.0
-                good = np.asarray(self.boom.limits.hold(self.curve(sign * middle)))
+                good = np.asarray(self.boom.limits.contain(self.curve(sign * middle)))
                 inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
             ends.append(sign * np.where(open_end, last, inside))
         lower, upper = ends
@@ -184,7 +184,7 @@ class Side:
             lower[0] = upper[0] = self.pinned
         return lower, upper
 
-    def wished(self, constraint: ChoiceHold, theta2: Array, lower: Array, upper: Array) -> Array:
+    def wished(self, constraint: ChoosingConstraint, theta2: Array, lower: Array, upper: Array) -> Array:
         """The constraint's best member (NODES,) within a cell of a curve and its corridor, by golden section."""
         cell = self.grid[1] - self.grid[0]
         a, b = np.clip(theta2 - cell, lower, upper), np.clip(theta2 + cell, lower, upper)
@@ -210,7 +210,7 @@ class Side:
         theta2 = np.concatenate([np.atleast_2d(each) for each in found])
         theta2 = limits.lower[1] + np.mod(theta2 - limits.lower[1] + 1e-12, 2.0 * np.pi) - 1e-12
         q = np.moveaxis(self.at(theta2.T), 0, 1)
-        within = np.asarray(limits.hold(q)).all(axis=-1)
+        within = np.asarray(limits.contain(q)).all(axis=-1)
         smooth = np.abs(np.diff(theta2, axis=-1)).max(axis=-1, initial=0.0) < _STEPS * (self.grid[1] - self.grid[0])
         if self.pinned is not None:
             within &= np.abs(theta2[:, 0] - self.pinned) < 1e-6
@@ -410,7 +410,7 @@ class SelfMotion:
 
         return make_interp_spline(np.linspace(0.0, 1.0, NODES), self.theta2, k=5)
 
-    def departure(self, boom: Boom, constraint: ChoiceHold) -> Departure:
+    def departure(self, boom: Boom, constraint: ChoosingConstraint) -> Departure:
         """Return how far the curve is from the constraint's own choice at each of its nodes, on the same side of the base."""
         chosen, exists = best_member(boom, self.side.targets, constraint)
         q = self.side.curve(self.theta2)
@@ -419,7 +419,7 @@ class SelfMotion:
         return Departure(str(constraint), max(float(excess[at]), 0.0), at / (NODES - 1), constraint.unit)
 
 
-def resolve(sides: list[Side], constraint: ChoiceHold | LeastTime, reference: Array) -> SelfMotion | None:
+def resolve(sides: list[Side], constraint: ChoosingConstraint | LeastTime, reference: Array) -> SelfMotion | None:
     """The smooth curve nearest to a constraint's wish that is quick enough; None where no connected one exists.
 
     Args:
@@ -454,7 +454,7 @@ class _Seed:
     """(3,) the least of the simple curves; infinite without one."""
 
 
-def _seeds(sides: list[Side], constraint: ChoiceHold | None, reference: Array) -> list[_Seed]:
+def _seeds(sides: list[Side], constraint: ChoosingConstraint | None, reference: Array) -> list[_Seed]:
     seeds = []
     for side in sides:
         found = side.connected(constraint)
@@ -481,7 +481,7 @@ def _smoothest(seed: _Seed) -> Array:
     return durations(side.boom, side.curve(side.smoothed(curve, curve, 0.0, *side.corridor(curve))))
 
 
-def _ladder(seed: _Seed, constraint: ChoiceHold) -> Iterator[tuple[SelfMotion, Array]]:
+def _ladder(seed: _Seed, constraint: ChoosingConstraint) -> Iterator[tuple[SelfMotion, Array]]:
     """Curves of a side from the most faithful to the smoothest, each with its durations (3,)."""
     side = seed.side
     for number, curve in enumerate(seed.curves[:2]):

@@ -60,5 +60,5 @@ def _between(boom: Boom, start: Array, goal: Array, room: float) -> list[Array]:
     mixed = [np.where(mask, goal, start) for mask in product((False, True), repeat=5)][1:-1]
     random = rng.uniform(limits.lower, limits.upper, (_RANDOM_POSES, 5))
     poses = np.unique(np.concatenate([np.array(mixed), random]), axis=0)
-    poses = poses[limits.hold(poses)]
+    poses = poses[limits.contain(poses)]
     return [q for q in poses if clearance(boom, q).distance >= room]

@@ -1,47 +1,20 @@
-"""Where a move starts and ends: a named pose, a joint position, or a tip target with a pitch and a hold."""
+"""Where a move starts and ends: a named pose, a joint position, or a tip target with a pitch and a constraint."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import (
-    ActuatorAngle,
-    ActuatorHorizontal,
-    Boom,
-    FixedExtension,
-    Hold,
-    InfeasibleError,
-    InputError,
-    LargestMargin,
-    LeastExtension,
-    LeastTime,
-    LeastTorque,
-    NearestHorizontal,
-    NearestPose,
-    inverse_kinematics,
-    nearest_reachable,
-)
+from boom_model import Boom, Constraint, InfeasibleError, InputError, inverse_kinematics, nearest_reachable
 from boom_model.arrays import Array, checked
+from boom_model.words import joint_position, number, numbers
 
 PITCHES = {"down": -np.pi / 2.0, "level": 0.0, "up": np.pi / 2.0}
-CHOICES = {
-    str(choice): choice
-    for choice in (
-        ActuatorHorizontal(),
-        LeastExtension(),
-        NearestHorizontal(),
-        LeastTorque(),
-        LargestMargin(),
-        LeastTime(),
-    )
-}
-HOLDS = f"{', '.join(CHOICES)}, actuator=DEG, extension=M, nearest=DEG,DEG,DEG,M,DEG"
 
 
 @dataclass(frozen=True)
 class TipTarget:
-    """A tip position in frame 1 [m]; its pitch and hold come with the plan."""
+    """A tip position in frame 1 [m]; its pitch and constraint come with the plan."""
 
     position: tuple[float, float, float]
 
@@ -60,9 +33,9 @@ def parse_target(text: str) -> Target:
     if not equals:
         return text
     if kind == "q":
-        return _joint_position(text, rest)
+        return joint_position(text, rest)
     if kind == "tip":
-        x, y, z = _numbers(text, rest, 3)
+        x, y, z = numbers(text, rest, 3)
         return TipTarget((x, y, z))
     raise InputError(f"{text!r} is no target; give a pose's name, q=DEG,DEG,DEG,M,DEG or tip=X,Y,Z")
 
@@ -77,7 +50,7 @@ def parse_pitch(text: str) -> float | None:
         return None
     if text in PITCHES:
         return PITCHES[text]
-    return float(np.radians(_number("pitch", text, "down, level, up, free or degrees")))
+    return float(np.radians(number("pitch", text, "down, level, up, free or degrees")))
 
 
 def parse_along(text: str) -> str | Array:
@@ -91,7 +64,7 @@ def parse_along(text: str) -> str | Array:
     kind, _, rest = text.partition("=")
     if kind != "arc":
         raise InputError(f"along {text!r} is not known; there are: joint, line, arc=X,Y,Z")
-    return np.array(_numbers(text, rest, 3))
+    return np.array(numbers(text, rest, 3))
 
 
 def parse_joint_velocity(text: str) -> Array:
@@ -100,28 +73,12 @@ def parse_joint_velocity(text: str) -> Array:
     Raises:
         InputError: the numbers are malformed, not finite, or too many or too few.
     """
-    return _joint_position(text, text)
+    return joint_position(text, text)
 
 
-def parse_hold(text: str) -> Hold:
-    """A hold as people write it; `actuator=DEG` is the actuator's elevation above the horizontal.
-
-    Raises:
-        InputError: none of the holds, or its value is not a finite number.
-    """
-    kind, equals, rest = text.partition("=")
-    if text in CHOICES:
-        return CHOICES[text]
-    if kind == "nearest" and equals:
-        return NearestPose.to(_joint_position(text, rest))
-    if kind == "actuator" and equals:
-        return ActuatorAngle(float(np.radians(_number("hold actuator", rest, "degrees"))))
-    if kind == "extension" and equals:
-        return FixedExtension(_number("hold extension", rest, "metres"))
-    raise InputError(f"hold {text!r} is not known; there are: {HOLDS}")
-
-
-def resolve(boom: Boom, target: Target, pitch: float | None, hold: Hold, reference: ArrayLike | None = None) -> Array:
+def resolve(
+    boom: Boom, target: Target, pitch: float | None, constraint: Constraint, reference: ArrayLike | None = None
+) -> Array:
     """The joint position (5,) of a target, within the limits.
 
     Args:
@@ -132,7 +89,7 @@ def resolve(boom: Boom, target: Target, pitch: float | None, hold: Hold, referen
         InfeasibleError: the joint position breaks a limit, or the tip target cannot be reached within the limits.
     """
     if isinstance(target, TipTarget):
-        return _tip(boom, target, pitch, hold, reference)
+        return _tip(boom, target, pitch, constraint, reference)
     name = f"pose {target!r}" if isinstance(target, str) else "joint position"
     q = boom.pose(target) if isinstance(target, str) else checked("joint position", target)
     if q.shape != (5,):
@@ -143,25 +100,25 @@ def resolve(boom: Boom, target: Target, pitch: float | None, hold: Hold, referen
     return q
 
 
-def _tip(boom: Boom, target: TipTarget, pitch: float | None, hold: Hold, reference: ArrayLike | None) -> Array:
-    found = inverse_kinematics(boom, target.position, pitch, hold, reference)
+def _tip(boom: Boom, target: TipTarget, pitch: float | None, constraint: Constraint, reference: ArrayLike | None) -> Array:
+    found = inverse_kinematics(boom, target.position, pitch, constraint, reference)
     if found.best is not None:
         return found.solutions[found.best].q
-    raise InfeasibleError(unreachable(boom, target.position, pitch, hold))
+    raise InfeasibleError(unreachable(boom, target.position, pitch, constraint))
 
 
-def unreachable(boom: Boom, position: ArrayLike, pitch: float | None, hold: Hold) -> str:
+def unreachable(boom: Boom, position: ArrayLike, pitch: float | None, constraint: Constraint) -> str:
     """Why no branch within the limits reaches a target: how far out of reach, or which limits each branch breaks.
 
     Raises:
         InputError: position is not finite or not (3,).
     """
-    found = inverse_kinematics(boom, position, pitch, hold)
+    found = inverse_kinematics(boom, position, pitch, constraint)
     free, pitch = " (free)" if pitch is None else "", found.pitch
-    head = f"tip {_point(np.asarray(position))} with pitch {np.degrees(pitch):.4g} deg{free} and hold {hold}"
-    nearest = nearest_reachable(boom, position, pitch, hold)
+    head = f"tip {_point(np.asarray(position))} with pitch {np.degrees(pitch):.4g} deg{free} and constraint {constraint}"
+    nearest = nearest_reachable(boom, position, pitch, constraint)
     if nearest is None:
-        tail = "no point on the line from it to the base can be reached with this pitch and hold"
+        tail = "no point on the line from it to the base can be reached with this pitch and constraint"
     else:
         limits = "within the limits" if nearest.within_limits else "though outside the limits"
         tail = (
@@ -176,26 +133,3 @@ def unreachable(boom: Boom, position: ArrayLike, pitch: float | None, hold: Hold
 
 def _point(position: Array) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in position) + ") m"
-
-
-def _joint_position(text: str, rest: str) -> Array:
-    q = np.array(_numbers(text, rest, 5))
-    q[[0, 1, 2, 4]] = np.radians(q[[0, 1, 2, 4]])
-    return q
-
-
-def _numbers(text: str, rest: str, count: int) -> list[float]:
-    parts = rest.split(",")
-    if len(parts) != count:
-        raise InputError(f"{text!r} has {len(parts)} numbers; it needs {count}")
-    return [_number(text, part, "a number") for part in parts]
-
-
-def _number(name: str, text: str, what: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise InputError(f"{name}: {text!r} is not {what}") from None
-    if not np.isfinite(value):
-        raise InputError(f"{name}: {text!r} must be finite")
-    return value

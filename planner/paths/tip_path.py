@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from boom_model import (
     Boom,
-    ChoiceHold,
-    Hold,
+    ChoosingConstraint,
+    Constraint,
     InfeasibleError,
     LeastExtension,
     LeastTime,
@@ -68,7 +68,7 @@ def follow(
     boom: Boom,
     curve: TipCurve,
     pitch: float,
-    constraint: Hold,
+    constraint: Constraint,
     reference: ArrayLike | None = None,
     tolerance: float = TIP_TOLERANCE,
 ) -> TipPath:
@@ -86,12 +86,12 @@ def follow(
     Raises:
         InputError: pitch is not finite.
         InfeasibleError: the curve leaves the reach (where), forces a flip to another branch (where), or no spline within
-            2048 nodes keeps the tolerance (the hold's choice jumps or kinks).
+            2048 nodes keeps the tolerance (the constraint's choice jumps or kinks).
     """
     pitch = scalar("pitch", pitch)
     limits = boom.limits
     start = (limits.lower + limits.upper) / 2.0 if reference is None else checked("reference", reference, 5)
-    if isinstance(constraint, ChoiceHold):
+    if isinstance(constraint, ChoosingConstraint):
         return _through_family(boom, curve, pitch, constraint, start, tolerance)
 
     def nodes(s: Array) -> Array:
@@ -101,7 +101,7 @@ def follow(
 
 
 def _fitted(
-    boom: Boom, curve: TipCurve, pitch: float, constraint: Hold, nodes: Callable[[Array], Array], tolerance: float
+    boom: Boom, curve: TipCurve, pitch: float, constraint: Constraint, nodes: Callable[[Array], Array], tolerance: float
 ) -> TipPath:
     """The spline through exact joint positions `nodes(s)`, doubled until the tip stays on its curve between them."""
     from scipy.interpolate import make_interp_spline
@@ -112,7 +112,7 @@ def _fitted(
         fine = np.linspace(0.0, 1.0, count * _CHECKS_PER_NODE + 1)
         q = spline(fine)
         deviation = float(np.linalg.norm(forward_kinematics(boom, q).position - curve(fine), axis=-1).max())
-        if deviation <= tolerance and boom.limits.hold(q).all():
+        if deviation <= tolerance and boom.limits.contain(q).all():
             return TipPath(curve, pitch, spline, deviation)
     raise InfeasibleError(
         f"no smooth joint path keeps the tip within {tolerance * 1e3:g} mm of its line under constraint {constraint}: "
@@ -121,7 +121,7 @@ def _fitted(
 
 
 def _through_family(
-    boom: Boom, curve: TipCurve, pitch: float, constraint: ChoiceHold, start: Array, tolerance: float
+    boom: Boom, curve: TipCurve, pitch: float, constraint: ChoosingConstraint, start: Array, tolerance: float
 ) -> TipPath:
     """The path of a constraint that chooses, resolved for the whole curve (`redundancy`)."""
     planned = _inset(boom)
@@ -135,7 +135,7 @@ def _through_family(
     return path if isinstance(constraint, LeastTime) else replace(path, departure=motion.departure(boom, constraint))
 
 
-def _no_curve(boom: Boom, planned: Boom, curve: TipCurve, pitch: float, constraint: ChoiceHold) -> str:
+def _no_curve(boom: Boom, planned: Boom, curve: TipCurve, pitch: float, constraint: ChoosingConstraint) -> str:
     """Why no joint path within the limits follows a curve: it leaves the workspace, or no branch leads from end to end."""
     s = np.linspace(0.0, 1.0, NODES)
     any_member = LeastExtension()
@@ -148,7 +148,7 @@ def _no_curve(boom: Boom, planned: Boom, curve: TipCurve, pitch: float, constrai
     return _flip(constraint, s[furthest], at)
 
 
-def _flip(constraint: Hold, s: float, at: str) -> str:
+def _flip(constraint: Constraint, s: float, at: str) -> str:
     return f"the tip's line forces a flip to another branch under constraint {constraint} at {s:.1%}, ({at}) m"
 
 
@@ -158,7 +158,7 @@ def _inset(boom: Boom) -> Boom:
     return replace(boom, limits=replace(boom.limits, lower=lower, upper=upper, linkage=boom.limits.linkage + 2.0 * _INSET[2]))
 
 
-def _one_branch(boom: Boom, curve: TipCurve, pitch: float, constraint: Hold, s: Array, start: Array) -> Array:
+def _one_branch(boom: Boom, curve: TipCurve, pitch: float, constraint: Constraint, s: Array, start: Array) -> Array:
     """q (n, 5) at s (n,), each on the branch nearest to the one before: of all starts that go through, the nearest."""
     found = solve_branches(boom, curve(s), pitch, constraint)
     reached = np.asarray(found.within_limits.any(axis=-1))
@@ -185,7 +185,7 @@ def _one_branch(boom: Boom, curve: TipCurve, pitch: float, constraint: Hold, s: 
     )
 
 
-def _leaves(boom: Boom, curve: TipCurve, pitch: float, constraint: Hold, s: Array, reached: Mask) -> str:
+def _leaves(boom: Boom, curve: TipCurve, pitch: float, constraint: Constraint, s: Array, reached: Mask) -> str:
     """Where a curve leaves the reach, by bisection beside its first node out of reach."""
     out = int(np.argmin(reached))
     if out == 0:

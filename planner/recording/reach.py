@@ -71,7 +71,7 @@ def log_boundary(recording: rr.RecordingStream, reach_map: ReachMap) -> None:
 def boundary_sentence(reach_map: ReachMap) -> str:
     """Return a description of the boundary for a title."""
     line = "grey line: reach" if reach_map.within_limits.any() else "no point reachable"
-    return f"{line} with constraint {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg"
+    return f"{line} with constraint {reach_map.constraint}, pitch {np.degrees(reach_map.pitch):.4g} deg"
 
 
 def boundary(reach_map: ReachMap) -> list[Array]:

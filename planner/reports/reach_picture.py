@@ -82,7 +82,7 @@ def reach_title(boom: Boom, reach_map: ReachMap) -> str:
     without = f"; not counted, without drive data: {left_out}" if left_out else ""
     counts = f"torque margin of {counted}{without}" if counted else "no drives"
     lines = [
-        f"{boom.name}: reach with constraint {reach_map.hold}, pitch {np.degrees(reach_map.pitch):.4g} deg, "
+        f"{boom.name}: reach with constraint {reach_map.constraint}, pitch {np.degrees(reach_map.pitch):.4g} deg, "
         f"payload {boom.payload.mass:g} kg",
         f"At rest on level ground; {counts}",
         "Collisions with the ground, the vehicle or the boom itself are not checked",

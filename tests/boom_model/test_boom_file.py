@@ -81,7 +81,7 @@ def test_position_limits_are_those_of_table_2_3():
 )
 def test_the_lower_link_stays_5_degrees_above_the_inner_one(inner, lower, inside):
     q = [0.0, np.radians(inner), np.radians(lower), 0.0, 0.0]
-    assert BOOM.limits.hold(q) == inside
+    assert BOOM.limits.contain(q) == inside
     assert len(BOOM.limits.reasons(q)) == (not inside)
 
 
@@ -125,7 +125,7 @@ def test_voltage_and_wiring_are_assumed_and_say_so(joint):
 )
 def test_poses_are_those_of_table_3_1(name, pose):
     np.testing.assert_allclose(BOOM.pose(name), pose * UNIT, rtol=ROUNDING, atol=0)
-    assert BOOM.limits.hold(BOOM.pose(name))
+    assert BOOM.limits.contain(BOOM.pose(name))
 
 
 def test_an_unknown_pose_is_bad_input():

@@ -131,7 +131,7 @@ def test_a_detour_keeps_clear_and_within_the_limits(profile):
     for motion in move.motions:
         q = motion(np.linspace(0.0, motion.duration, 1001))[0]
         assert distances(boom, q).min() >= 0.05 - 1e-3
-        assert LIMITS.hold(q).all()
+        assert LIMITS.contain(q).all()
     np.testing.assert_allclose(move.trajectory.q[[0, -1]], [start, goal], rtol=0, atol=1e-13)
     notes = [note for note in move.report.notes if note.startswith("led round what the arm must keep away from")]
     assert len(notes) == len(move.motions) - 1

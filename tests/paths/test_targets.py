@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from boom_model import ActuatorAngle, ActuatorHorizontal, Boom, FixedExtension, InfeasibleError, InputError, forward_kinematics
-from planner.paths.targets import TipTarget, parse_hold, parse_pitch, parse_target, resolve, unreachable
+from boom_model.kinematics.constraints import parse_constraint
+from planner.paths.targets import TipTarget, parse_pitch, parse_target, resolve, unreachable
 
 BOOM = Boom.load()
 DOWN = -np.pi / 2.0
@@ -19,9 +20,9 @@ def test_targets_are_read_in_degrees_and_metres():
 def test_pitches_and_holds():
     assert [parse_pitch(p) for p in ("down", "level", "up")] == [-np.pi / 2, 0.0, np.pi / 2]
     assert parse_pitch("-30") == pytest.approx(-np.pi / 6, abs=1e-15)
-    assert parse_hold("horizontal") == ActuatorHorizontal()
-    assert parse_hold("actuator=-30") == ActuatorAngle(np.radians(-30.0))
-    assert parse_hold("extension=0.25") == FixedExtension(0.25)
+    assert parse_constraint("horizontal") == ActuatorHorizontal()
+    assert parse_constraint("actuator=-30") == ActuatorAngle(np.radians(-30.0))
+    assert parse_constraint("extension=0.25") == FixedExtension(0.25)
 
 
 @pytest.mark.parametrize(
@@ -34,8 +35,8 @@ def test_malformed_targets_are_refused(text):
 
 @pytest.mark.parametrize("text", ["sideways", "extension", "extension=", "extension=nan", "actuator=x", "horizontal=1"])
 def test_malformed_holds_are_refused(text):
-    with pytest.raises(InputError, match="hold"):
-        parse_hold(text)
+    with pytest.raises(InputError, match="constraint"):
+        parse_constraint(text)
 
 
 @pytest.mark.parametrize("text", ["", "nan", "left"])
@@ -49,7 +50,7 @@ def test_tip_target_resolves_to_a_joint_position_that_reaches_it():
     tip = forward_kinematics(BOOM, q)
     np.testing.assert_allclose(tip.position, [1.4, 0.0, 1.0], atol=1e-14)
     assert tip.pitch == pytest.approx(DOWN, abs=1e-14)
-    assert BOOM.limits.hold(q)
+    assert BOOM.limits.contain(q)
 
 
 def test_unknown_pose_lists_those_there_are():

@@ -161,7 +161,7 @@ def test_smooth_path_never_turns_back_beyond_its_extremes_where_a_plain_spline_w
         q = path(np.linspace(0.0, 1.0, 5001))
         knots = path.spline.x
         np.testing.assert_allclose(path(knots), waypoints, rtol=0, atol=1e-12)
-        assert LIMITS.hold(q).all()
+        assert LIMITS.contain(q).all()
         for order in (0, 1, 2):
             inner = knots[1:-1]
             np.testing.assert_allclose(path(inner - 1e-12, order), path(inner + 1e-12, order), rtol=0, atol=1e-6)

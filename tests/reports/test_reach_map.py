@@ -54,12 +54,12 @@ def test_geometry_reaches_a_band_as_high_as_the_inner_link_under_a_horizontal_ac
     np.testing.assert_array_equal(found.exists, np.broadcast_to(expected[:, None], found.exists.shape))
 
 
-@pytest.mark.parametrize("hold", [ActuatorHorizontal(), ActuatorAngle(-0.6), FixedExtension(0.4), LeastTorque()], ids=str)
-def test_every_cell_is_reached_within_the_limits_with_its_margin(hold):
-    found = reach_map(BOOM, hold, DOWN, R, Z)
+@pytest.mark.parametrize("constraint", [ActuatorHorizontal(), ActuatorAngle(-0.6), FixedExtension(0.4), LeastTorque()], ids=str)
+def test_every_cell_is_reached_within_the_limits_with_its_margin(constraint):
+    found = reach_map(BOOM, constraint, DOWN, R, Z)
     q = found.q[found.within_limits]
     assert len(q) > 100
-    assert BOOM.limits.hold(q).all()
+    assert BOOM.limits.contain(q).all()
     r, z = (grid[found.within_limits] for grid in np.meshgrid(R, Z))
     tip = forward_kinematics(BOOM, q)
     np.testing.assert_allclose(tip.position, np.stack([r, np.zeros_like(r), z], axis=-1), rtol=0, atol=1e-13)
@@ -72,21 +72,21 @@ def test_every_cell_is_reached_within_the_limits_with_its_margin(hold):
         assert np.isnan(values[~found.within_limits]).all()
 
 
-@pytest.mark.parametrize("hold", [ActuatorHorizontal(), FixedExtension(0.4), LeastExtension()], ids=str)
+@pytest.mark.parametrize("constraint", [ActuatorHorizontal(), FixedExtension(0.4), LeastExtension()], ids=str)
 @pytest.mark.parametrize("pitch", [DOWN, -1.2])
-def test_boundary_within_the_limits_is_where_joint_positions_within_them_end(hold, pitch):
-    """Forward kinematics of all joint positions within the limits that meet hold and pitch, against the map, to a cell.
+def test_boundary_within_the_limits_is_where_joint_positions_within_them_end(constraint, pitch):
+    """Forward kinematics of all joint positions within the limits that meet constraint and pitch, against the map, to a cell.
 
     A sliver between the cells' middles is no cell of the map.
     """
-    found = reach_map(BOOM, hold, pitch, R, Z)
+    found = reach_map(BOOM, constraint, pitch, R, Z)
     low, high = BOOM.limits.lower, BOOM.limits.upper
-    inner, lower, extension = (np.linspace(low[i], high[i], 81 if hold == LeastExtension() else 401) for i in (1, 2, 3))
-    lower = np.array([np.pi]) if isinstance(hold, ActuatorHorizontal) else lower
-    extension = np.array([hold.extension]) if isinstance(hold, FixedExtension) else extension
+    inner, lower, extension = (np.linspace(low[i], high[i], 81 if constraint == LeastExtension() else 401) for i in (1, 2, 3))
+    lower = np.array([np.pi]) if isinstance(constraint, ActuatorHorizontal) else lower
+    extension = np.array([constraint.extension]) if isinstance(constraint, FixedExtension) else extension
     q = np.stack(np.broadcast_arrays(0.0, *np.meshgrid(inner, lower, extension), 0.0), axis=-1).reshape(-1, 5)
     q[:, 4] = np.mod(pitch - np.pi / 2.0 - q[:, 2] + np.pi, 2.0 * np.pi) - np.pi
-    tips = forward_kinematics(BOOM, q[BOOM.limits.hold(q)]).position[:, [0, 2]]
+    tips = forward_kinematics(BOOM, q[BOOM.limits.contain(q)]).position[:, [0, 2]]
     tips = np.concatenate([tips, tips * (-1.0, 1.0)])  # the base turned round
     seen = np.histogram2d(tips[:, 1], tips[:, 0], bins=[np.append(g, g[-1] + 0.05) - 0.025 for g in (Z, R)])[0] > 0
     nearby = np.ones((3, 3))
@@ -113,18 +113,18 @@ def test_default_grid_covers_the_reach_of_every_hold():
     assert not any(a.flags.writeable for a in (found.r, found.z, found.exists, found.within_limits, found.q))
 
 
-@pytest.mark.parametrize("hold", [ActuatorHorizontal(), FixedExtension(0.4), LeastTorque()], ids=str)
-def test_more_payload_leaves_less_margin(hold):
-    margins = [reach_map(BOOM.with_payload(kg), hold, DOWN, R[60:], Z).torque_margin for kg in (2.0, 10.0, 18.0)]
+@pytest.mark.parametrize("constraint", [ActuatorHorizontal(), FixedExtension(0.4), LeastTorque()], ids=str)
+def test_more_payload_leaves_less_margin(constraint):
+    margins = [reach_map(BOOM.with_payload(kg), constraint, DOWN, R[60:], Z).torque_margin for kg in (2.0, 10.0, 18.0)]
     for lighter, heavier in itertools.pairwise(margins):
         seen = np.isfinite(lighter)
         np.testing.assert_array_equal(np.isfinite(heavier), seen)
         assert (heavier[seen] < lighter[seen]).all()
 
 
-@pytest.mark.parametrize("hold", [ActuatorHorizontal(), FixedExtension(0.4)], ids=str)
-def test_least_torque_leaves_the_most_margin(hold):
-    held, least = (reach_map(BOOM, h, DOWN, R, Z) for h in (hold, LeastTorque()))
+@pytest.mark.parametrize("constraint", [ActuatorHorizontal(), FixedExtension(0.4)], ids=str)
+def test_least_torque_leaves_the_most_margin(constraint):
+    held, least = (reach_map(BOOM, h, DOWN, R, Z) for h in (constraint, LeastTorque()))
     assert least.within_limits[held.within_limits].all()
     both = held.within_limits
     assert (least.torque_margin[both] >= held.torque_margin[both] - 1e-9).all()
@@ -181,10 +181,10 @@ def test_unwritable_path_is_bad_input(coarse, write, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["--hold", "horizontal", "--json"], 0, ""),
+        (["--constraint", "horizontal", "--json"], 0, ""),
         (["--pitch", "free"], 2, "drawn for one pitch"),
         (["--out", "reach.txt"], 2, "written as .png or .rrd"),
-        (["--hold", "extension=9"], 1, "within the limits"),
+        (["--constraint", "extension=9"], 1, "within the limits"),
     ],
 )
 def test_command(arguments, code, message, tmp_path, monkeypatch, capsys):

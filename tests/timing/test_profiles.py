@@ -36,7 +36,7 @@ def random_pairs(count: int):
     rng = np.random.default_rng(20)
     while count:
         pair = rng.uniform(LIMITS.lower, LIMITS.upper, (2, 5))
-        if LIMITS.hold(pair).all():
+        if LIMITS.contain(pair).all():
             count -= 1
             yield pair
 
@@ -158,7 +158,7 @@ def test_random_moves_keep_every_limit(profile):
         move = plan(BOOM, start, goal, profile=profile)
         assert max(worst_ratios(move).values()) <= SLACK
         fine = sample(move.motions[0], 0.002)
-        assert LIMITS.hold(fine.q).all()
+        assert LIMITS.contain(fine.q).all()
         np.testing.assert_allclose(fine.q[[0, -1]], [start, goal], rtol=0, atol=5e-14)
         np.testing.assert_allclose(fine.qd[[0, -1]], 0.0, atol=1e-9)
         if profile is Profile.JERK_LIMITED:

@@ -52,7 +52,7 @@ def random_cases(count: int) -> list[Case]:
     rng, limits, pairs = np.random.default_rng(20), BOOM.limits, []
     while len(pairs) < count:
         pair = rng.uniform(limits.lower, limits.upper, (2, 5))
-        if limits.hold(pair).all():
+        if limits.contain(pair).all():
             pairs.append(pair)
     factors = (SHIPPED, FAR_RAISED, RAISED, OUT_OF_THE_WAY)
     payloads = np.linspace(0.0, 10.0, count)

@@ -15,9 +15,9 @@ from boom_model.kinematics import families
 from boom_model.kinematics.constraints import (
     ActuatorAngle,
     ActuatorHorizontal,
-    ChoiceHold,
+    ChoosingConstraint,
+    Constraint,
     FixedExtension,
-    Hold,
     LargestMargin,
     LeastExtension,
     LeastTorque,
@@ -40,25 +40,25 @@ CHOICES = (
     LargestMargin(),
 )
 CONSTRAINTS = (ActuatorHorizontal(), ActuatorAngle(-0.4), FixedExtension(0.25))
-EVERY_CHOICE = pytest.mark.parametrize("hold", CHOICES, ids=lambda hold: type(hold).__name__)
+EVERY_CHOICE = pytest.mark.parametrize("constraint", CHOICES, ids=lambda constraint: type(constraint).__name__)
 SCAN = np.linspace(LIMITS.lower[1], LIMITS.upper[1], 2001)
 
 
-def cost(hold: ChoiceHold, q: Array) -> Array:
-    """What a hold says it makes least, (...) of q (..., 5), written down a second time; infinite outside the limits."""
+def cost(constraint: ChoosingConstraint, q: Array) -> Array:
+    """What a constraint says it makes least, (...) of q (..., 5), written down a second time; infinite outside the limits."""
     span = LIMITS.upper - LIMITS.lower
-    if isinstance(hold, LeastExtension):
+    if isinstance(constraint, LeastExtension):
         value = q[..., 3]
-    elif isinstance(hold, NearestHorizontal):
+    elif isinstance(constraint, NearestHorizontal):
         value = np.abs(q[..., 2] - np.pi)
-    elif isinstance(hold, LeastTorque):
+    elif isinstance(constraint, LeastTorque):
         value = static_ratio(np.nan_to_num(q))
-    elif isinstance(hold, NearestPose):
-        value = (((q - hold.pose) / span) ** 2).sum(axis=-1)
+    elif isinstance(constraint, NearestPose):
+        value = (((q - constraint.pose) / span) ** 2).sum(axis=-1)
     else:
         room = np.minimum(q - LIMITS.lower, LIMITS.upper - q) / span
         value = -np.minimum(room.min(axis=-1), (q[..., 2] - q[..., 1] - LIMITS.linkage) / span[2])
-    return np.where(LIMITS.hold(q), value, np.inf)
+    return np.where(LIMITS.contain(q), value, np.inf)
 
 
 def static_ratio(q: Array) -> Array:
@@ -95,26 +95,26 @@ def misses(q: Array, position: Array, pitch: Array | float) -> Array:
 
 
 @EVERY_CHOICE
-def test_a_choice_reaches_200_targets_and_no_member_of_a_dense_scan_is_cheaper(hold):
+def test_a_choice_reaches_200_targets_and_no_member_of_a_dense_scan_is_cheaper(constraint):
     position, pitch = random_targets(200, seed=11)
-    found = solve_branches(BOOM, position, pitch, hold)
+    found = solve_branches(BOOM, position, pitch, constraint)
     np.testing.assert_array_equal(found.exists, found.within_limits)
     assert found.exists.any(axis=-1).all()
     target, side = np.nonzero(found.exists)
     q = found.q[target, side]
-    assert LIMITS.hold(q).all()
+    assert LIMITS.contain(q).all()
     assert misses(q, position[target], pitch[target]).max() < 1.5e-14
-    scan = cost(hold, families.member(BOOM, both_sides(position, pitch), SCAN)).min(axis=-1).reshape(2, -1).T
+    scan = cost(constraint, families.member(BOOM, both_sides(position, pitch), SCAN)).min(axis=-1).reshape(2, -1).T
     mine = np.full_like(scan, np.inf)
-    mine[found.exists] = cost(hold, q)
+    mine[found.exists] = cost(constraint, q)
     assert (mine <= scan + 1e-12).all()
 
 
 @EVERY_CHOICE
-def test_the_best_is_the_cheaper_side_of_the_base(hold):
+def test_the_best_is_the_cheaper_side_of_the_base(constraint):
     for position, pitch in zip(*random_targets(15, seed=12), strict=True):
-        found = inverse_kinematics(BOOM, position, float(pitch), hold)
-        costs = [float(cost(hold, solution.q)) for solution in found.solutions]
+        found = inverse_kinematics(BOOM, position, float(pitch), constraint)
+        costs = [float(cost(constraint, solution.q)) for solution in found.solutions]
         assert costs[found.best] == min(costs)
 
 
@@ -162,45 +162,45 @@ def test_least_torque_counts_the_payload():
 
 def test_least_torque_needs_a_drive():
     bare = replace(BOOM, drives=(None,) * 5)
-    with pytest.raises(InputError, match=r"hold least-torque: no joint of .* has a drive to measure torques by"):
+    with pytest.raises(InputError, match=r"constraint least-torque: no joint of .* has a drive to measure torques by"):
         solve_branches(bare, (1.4, 0.0, 1.0), DOWN, LeastTorque())
 
 
 @EVERY_CHOICE
-def test_out_of_reach_there_is_no_choice_and_no_warning(hold):
+def test_out_of_reach_there_is_no_choice_and_no_warning(constraint):
     position = np.array([(0.0, 0.0, 4.0), (30.0, -40.0, 10.0), (1e6, 0.0, -1e6), (1.4, 0.0, 1.0)])
     with warnings.catch_warnings(action="error"):
-        found = solve_branches(BOOM, position, DOWN, hold)
+        found = solve_branches(BOOM, position, DOWN, constraint)
     np.testing.assert_array_equal(found.exists.any(axis=-1), [False, False, False, True])
     np.testing.assert_array_equal(np.isnan(found.q).any(axis=-1), ~found.exists)
     assert np.isnan(found.q[~found.exists]).all()
-    assert inverse_kinematics(BOOM, position[0], DOWN, hold).solutions == ()
+    assert inverse_kinematics(BOOM, position[0], DOWN, constraint).solutions == ()
 
 
 @EVERY_CHOICE
 @pytest.mark.parametrize("position", [(1e200, 0.0, 1.0), (0.0, -1e308, 1e308)])
-def test_a_target_whose_squares_overflow_is_out_of_reach_of_a_choice(hold, position):
-    found = solve_branches(BOOM, position, DOWN, hold)
+def test_a_target_whose_squares_overflow_is_out_of_reach_of_a_choice(constraint, position):
+    found = solve_branches(BOOM, position, DOWN, constraint)
     assert not found.exists.any()
     assert np.isnan(found.q).all()
 
 
 @EVERY_CHOICE
-def test_a_batch_of_choices_is_its_targets_one_by_one(hold):
+def test_a_batch_of_choices_is_its_targets_one_by_one(constraint):
     position, pitch = random_targets(12, seed=16)
-    batch = solve_branches(BOOM, position.reshape(3, 4, 3), pitch.reshape(3, 4), hold)
+    batch = solve_branches(BOOM, position.reshape(3, 4, 3), pitch.reshape(3, 4), constraint)
     assert batch.q.shape == (3, 4, 2, 5)
-    alone = [solve_branches(BOOM, p, a, hold) for p, a in zip(position, pitch, strict=True)]
+    alone = [solve_branches(BOOM, p, a, constraint) for p, a in zip(position, pitch, strict=True)]
     np.testing.assert_array_equal(batch.exists.reshape(-1, 2), [b.exists for b in alone])
     np.testing.assert_array_equal(batch.q.reshape(-1, 2, 5), [b.q for b in alone])
 
 
 @EVERY_CHOICE
-def test_every_limit_that_a_dense_scan_crosses_is_an_end_of_an_interval(hold):
+def test_every_limit_that_a_dense_scan_crosses_is_an_end_of_an_interval(constraint):
     position, pitch = random_targets(200, seed=17)
     targets = both_sides(position, pitch)
-    allowed = LIMITS.hold(families.member(BOOM, targets, SCAN))
-    ends = families._ends(BOOM, targets, hold)
+    allowed = LIMITS.contain(families.member(BOOM, targets, SCAN))
+    ends = families._ends(BOOM, targets, constraint)
     row, step = np.nonzero(allowed[:, 1:] != allowed[:, :-1])
     assert len(row) > 200
     inside = (ends[row] >= SCAN[step, None] - 1e-9) & (ends[row] <= SCAN[step + 1, None] + 1e-9)
@@ -219,34 +219,34 @@ FREE = {
 }
 
 
-@pytest.mark.parametrize(("hold", "count"), FREE.items(), ids=lambda hold: type(hold).__name__)
-def test_a_free_pitch_is_as_good_as_any_of_a_dense_scan(hold, count):
-    measure = LargestMargin() if hold in CONSTRAINTS else hold
-    for position in reachable_by(hold, count):
-        found = inverse_kinematics(BOOM, position, None, hold)
+@pytest.mark.parametrize(("constraint", "count"), FREE.items(), ids=lambda constraint: type(constraint).__name__)
+def test_a_free_pitch_is_as_good_as_any_of_a_dense_scan(constraint, count):
+    measure = LargestMargin() if constraint in CONSTRAINTS else constraint
+    for position in reachable_by(constraint, count):
+        found = inverse_kinematics(BOOM, position, None, constraint)
         best = found.solutions[found.best]
-        scan = solve_branches(BOOM, position, np.linspace(-np.pi, np.pi, 721), hold)
+        scan = solve_branches(BOOM, position, np.linspace(-np.pi, np.pi, 721), constraint)
         least = cost(measure, scan.q).min()
         assert best.within_limits
         assert cost(measure, best.q) <= least + 1e-12
         assert (misses(np.array([s.q for s in found.solutions]), position, found.pitch) < 1e-13).all()
 
 
-def reachable_by(hold: Hold, count: int) -> Array:
+def reachable_by(constraint: Constraint, count: int) -> Array:
     q = random_states(BOOM, 400, np.random.default_rng(18))[0]
-    if isinstance(hold, FixedExtension):
-        q[:, 3] = hold.extension
-    elif isinstance(hold, ActuatorAngle):
-        q[:, 2] = np.pi + hold.elevation
-    return forward_kinematics(BOOM, q[LIMITS.hold(q)][:count]).position
+    if isinstance(constraint, FixedExtension):
+        q[:, 3] = constraint.extension
+    elif isinstance(constraint, ActuatorAngle):
+        q[:, 2] = np.pi + constraint.elevation
+    return forward_kinematics(BOOM, q[LIMITS.contain(q)][:count]).position
 
 
-@pytest.mark.parametrize("hold", [*CHOICES, *CONSTRAINTS], ids=lambda hold: type(hold).__name__)
-def test_no_pitch_reaches_a_far_position(hold):
-    found = inverse_kinematics(BOOM, (4.0, 1.0, 1.0), None, hold)
+@pytest.mark.parametrize("constraint", [*CHOICES, *CONSTRAINTS], ids=lambda constraint: type(constraint).__name__)
+def test_no_pitch_reaches_a_far_position(constraint):
+    found = inverse_kinematics(BOOM, (4.0, 1.0, 1.0), None, constraint)
     assert found.best is None
     assert not any(solution.within_limits for solution in found.solutions)
-    assert hold in CONSTRAINTS or found.solutions == ()
+    assert constraint in CONSTRAINTS or found.solutions == ()
 
 
 def test_a_given_pitch_is_the_one_that_solutions_tell():

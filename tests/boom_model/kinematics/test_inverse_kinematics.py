@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, Boom
 from boom_model.errors import InputError
-from boom_model.kinematics.constraints import ActuatorAngle, ActuatorHorizontal, FixedExtension, Hold
+from boom_model.kinematics.constraints import ActuatorAngle, ActuatorHorizontal, Constraint, FixedExtension
 from boom_model.kinematics.forward import forward_kinematics
 from boom_model.kinematics.inverse import Branches, Solution, Solutions, inverse_kinematics, solve_branches
 from tests.oracles import random_states
@@ -18,11 +18,11 @@ from tests.oracles import random_states
 BOOM = Boom.load()
 GEOMETRY = BOOM.geometry
 DOWN, UP, TURN = -np.pi / 2, np.pi / 2, 2 * np.pi
-HOLDS = pytest.mark.parametrize("kind", [ActuatorAngle, FixedExtension])
+CONSTRAINTS = pytest.mark.parametrize("kind", [ActuatorAngle, FixedExtension])
 
 
-def holding(kind: type[Hold], q: Array) -> Hold:
-    """The hold that q (5,) meets."""
+def holding(kind: type[Constraint], q: Array) -> Constraint:
+    """The constraint that q (5,) meets."""
     return FixedExtension(float(q[3])) if kind is FixedExtension else ActuatorAngle(float(q[2]) - np.pi)
 
 
@@ -43,8 +43,8 @@ def misses(q: Array, position: Array, pitch: Array | float) -> Array:
     return np.maximum(np.linalg.norm(tip.position - position, axis=-1), np.abs(turned(tip.pitch - pitch)))
 
 
-def solved_at(kind: type[Hold], q: Array) -> Solutions:
-    """The branches of q's own target, under the hold that q meets."""
+def solved_at(kind: type[Constraint], q: Array) -> Solutions:
+    """The branches of q's own target, under the constraint that q meets."""
     tip = forward_kinematics(BOOM, q)
     return inverse_kinematics(BOOM, tip.position, float(tip.pitch), holding(kind, q))
 
@@ -54,7 +54,7 @@ def nearest(found: Solutions, q: Array) -> Solution:
 
 
 @pytest.mark.parametrize(
-    ("position", "pitch", "hold", "printed", "reason"),
+    ("position", "pitch", "constraint", "printed", "reason"),
     [
         pytest.param(
             (1.4, 0.0, 1.0),
@@ -77,10 +77,10 @@ def nearest(found: Solutions, q: Array) -> Solution:
         ),
     ],
 )
-def test_rows_of_table_2_7_are_among_the_branches(position, pitch, hold, printed, reason):
+def test_rows_of_table_2_7_are_among_the_branches(position, pitch, constraint, printed, reason):
     q = np.array(printed.split(), dtype=float)
     unit_of_last_digit = 10.0 ** -np.array([len(number.split(".")[1]) for number in printed.split()])
-    found = inverse_kinematics(BOOM, position, pitch, hold)
+    found = inverse_kinematics(BOOM, position, pitch, constraint)
     row = nearest(found, q)
     assert (np.abs(row.q - q) < unit_of_last_digit).all()
     assert row.within_limits == (reason is None)
@@ -97,8 +97,8 @@ def test_down_and_horizontal_unless_told_otherwise():
     assert all(s.q[2] == pytest.approx(np.pi, abs=5e-16) for s in plain.solutions)
 
 
-def reachable(kind: type[Hold], groups: int, size: int, seed: int) -> list[tuple[Array, Hold]]:
-    """Groups of q (size, 5) within the limits, each group with one hold that all of it meets."""
+def reachable(kind: type[Constraint], groups: int, size: int, seed: int) -> list[tuple[Array, Constraint]]:
+    """Groups of q (size, 5) within the limits, each group with one constraint that all of it meets."""
     rng = np.random.default_rng(seed)
     drawn = []
     for _ in range(groups):
@@ -112,11 +112,11 @@ def reachable(kind: type[Hold], groups: int, size: int, seed: int) -> list[tuple
     return drawn
 
 
-@HOLDS
+@CONSTRAINTS
 def test_every_branch_of_10000_targets_reaches_its_target(kind):
-    for q, hold in reachable(kind, 100, 100, seed=1):
+    for q, constraint in reachable(kind, 100, 100, seed=1):
         tip = forward_kinematics(BOOM, q)
-        found = solve_branches(BOOM, tip.position, tip.pitch, hold)
+        found = solve_branches(BOOM, tip.position, tip.pitch, constraint)
         target, branch = np.nonzero(found.exists)
         branches = found.q[target, branch]
         assert misses(branches, tip.position[target], tip.pitch[target]).max() < 2e-14
@@ -126,26 +126,26 @@ def test_every_branch_of_10000_targets_reaches_its_target(kind):
 
 @pytest.mark.parametrize(("kind", "tolerance"), [(ActuatorAngle, 1e-11), (FixedExtension, 6e-13)])
 def test_the_joints_a_target_was_made_from_are_among_its_branches(kind, tolerance):
-    for q, hold in reachable(kind, 100, 100, seed=2):
+    for q, constraint in reachable(kind, 100, 100, seed=2):
         tip = forward_kinematics(BOOM, q)
-        found = solve_branches(BOOM, tip.position, tip.pitch, hold)
+        found = solve_branches(BOOM, tip.position, tip.pitch, constraint)
         apart = np.where(found.within_limits, np.abs(found.q - q[:, None]).max(axis=-1), np.inf)
         assert apart.min(axis=-1).max() < tolerance
 
 
-@HOLDS
+@CONSTRAINTS
 def test_branches_are_within_limits_just_where_the_limits_hold(kind):
-    for q, hold in reachable(kind, 20, 100, seed=3):
+    for q, constraint in reachable(kind, 20, 100, seed=3):
         tip = forward_kinematics(BOOM, q)
-        found = solve_branches(BOOM, tip.position, tip.pitch, hold)
+        found = solve_branches(BOOM, tip.position, tip.pitch, constraint)
         lower, upper = BOOM.limits.lower - 1e-9, BOOM.limits.upper + 1e-9
         inside = ((lower <= found.q) & (found.q <= upper)).all(axis=-1)
         apart = found.q[..., 2] - found.q[..., 1] >= np.radians(5.0) - 1e-9
         np.testing.assert_array_equal(found.within_limits, found.exists & inside & apart)
 
 
-def numeric_branches(position: Array, pitch: float, hold: Hold, rng: np.random.Generator) -> list[Array]:
-    """Every q that closes tip, pitch and hold, by Newton's method from 40 random starts; to within whole turns."""
+def numeric_branches(position: Array, pitch: float, constraint: Constraint, rng: np.random.Generator) -> list[Array]:
+    """Every q that closes tip, pitch and constraint, by Newton's method from 40 random starts; to within whole turns."""
     g = GEOMETRY
 
     def residual(q: Array) -> tuple[float, ...]:
@@ -154,7 +154,7 @@ def numeric_branches(position: Array, pitch: float, hold: Hold, rng: np.random.G
         wrist = pin8 - complex(g.L7 + q[3], g.L6) * cmath.exp(1j * q[2])
         tip = wrist + 1j * g.L8 * cmath.exp(1j * phi)
         plan = tip.real * cmath.exp(1j * q[0]) - complex(position[0], position[1])
-        held = q[3] - hold.extension if isinstance(hold, FixedExtension) else q[2] - np.pi - hold.elevation
+        held = q[3] - constraint.extension if isinstance(constraint, FixedExtension) else q[2] - np.pi - constraint.elevation
         return plan.real, plan.imag, tip.imag - position[2], phi + np.pi / 2 - pitch, held
 
     roots: list[Array] = []
@@ -166,13 +166,13 @@ def numeric_branches(position: Array, pitch: float, hold: Hold, rng: np.random.G
 
 
 @pytest.mark.parametrize(
-    ("hold", "joint", "value"), [(FixedExtension(0.4), 3, 0.4), (ActuatorAngle(-0.3), 2, np.pi - 0.3)], ids=str
+    ("constraint", "joint", "value"), [(FixedExtension(0.4), 3, 0.4), (ActuatorAngle(-0.3), 2, np.pi - 0.3)], ids=str
 )
-def test_a_million_targets_at_once_come_back(hold, joint, value):
+def test_a_million_targets_at_once_come_back(constraint, joint, value):
     q = np.random.default_rng(40).uniform(BOOM.limits.lower, BOOM.limits.upper, (1_000_000, 5))
     q[:, joint] = value
     tip = forward_kinematics(BOOM, q)
-    found = solve_branches(BOOM, tip.position, tip.pitch, hold)
+    found = solve_branches(BOOM, tip.position, tip.pitch, constraint)
     assert found.exists.any(axis=-1).all()
     target = np.nonzero(found.exists)[0]
     back = forward_kinematics(BOOM, found.q[found.exists])
@@ -180,17 +180,17 @@ def test_a_million_targets_at_once_come_back(hold, joint, value):
     assert np.abs(turned(back.pitch - tip.pitch[target])).max() < 1.5e-14
 
 
-@HOLDS
+@CONSTRAINTS
 def test_branches_are_those_of_a_numeric_solver(kind):
     rng = np.random.default_rng(4)
     counts = []
     for i, q in enumerate(random_states(BOOM, 500, rng)[0]):
         tip = forward_kinematics(BOOM, q)
-        position, pitch, hold = tip.position, float(tip.pitch), holding(kind, q)
+        position, pitch, constraint = tip.position, float(tip.pitch), holding(kind, q)
         if i % 2:  # anywhere, reachable or not
             position, pitch = rng.uniform((-2.5, -2.5, -1.5), 2.5), rng.uniform(-np.pi, np.pi)
-        expected = numeric_branches(position, pitch, hold, rng)
-        found = [solution.q for solution in inverse_kinematics(BOOM, position, pitch, hold).solutions]
+        expected = numeric_branches(position, pitch, constraint, rng)
+        found = [solution.q for solution in inverse_kinematics(BOOM, position, pitch, constraint).solutions]
         assert len(found) == len(expected)
         assert all(min(separation(q, other) for other in expected) < 1e-10 for q in found)
         assert all(min(separation(q, other) for other in found) < 1e-10 for q in expected)
@@ -204,7 +204,7 @@ def on_this_side(found: Branches, yaw: float) -> Array:
 
 
 TANGENT = pytest.mark.parametrize(
-    ("hold", "q", "outward"),
+    ("constraint", "q", "outward"),
     [
         # The inner link stands across the actuator: it would take a longer one to reach further that way.
         pytest.param(ActuatorHorizontal(), (0.7, np.pi / 2, np.pi, 0.3, 0.0), np.pi / 2, id="actuator held"),
@@ -226,9 +226,9 @@ def towards(q: tuple[float, ...], elevation: float) -> Array:
 
 
 @TANGENT
-def test_a_target_on_the_boundary_of_the_reach_is_one_branch(hold, q, outward):
+def test_a_target_on_the_boundary_of_the_reach_is_one_branch(constraint, q, outward):
     tip = forward_kinematics(BOOM, q)
-    found = solve_branches(BOOM, tip.position, tip.pitch, hold)
+    found = solve_branches(BOOM, tip.position, tip.pitch, constraint)
     here = on_this_side(found, q[0])
     assert here.sum() == 1
     assert found.within_limits[here]
@@ -238,38 +238,38 @@ def test_a_target_on_the_boundary_of_the_reach_is_one_branch(hold, q, outward):
 
 @TANGENT
 @pytest.mark.parametrize("distance", 10.0 ** np.arange(-15, -2))
-def test_beside_the_boundary_two_branches_become_none(hold, q, outward, distance):
+def test_beside_the_boundary_two_branches_become_none(constraint, q, outward, distance):
     """Closer than the closure's rounding can tell they may stay one, and miss by as much."""
     tip = forward_kinematics(BOOM, q)
     for away, branches in ((-distance, 2), (distance, 0)):
         position = tip.position + away * towards(q, outward)
-        found = solve_branches(BOOM, position, tip.pitch, hold)
+        found = solve_branches(BOOM, position, tip.pitch, constraint)
         here = on_this_side(found, q[0])
         assert here.sum() == branches or (here.sum() == 1 and distance < 5e-12)
         assert (misses(found.q[here], position, tip.pitch) < 9e-15 + 1.01 * max(away, 0.0)).all()
 
 
-@pytest.mark.parametrize("hold", [ActuatorHorizontal(), ActuatorAngle(-0.5), FixedExtension(0.25)], ids=str)
+@pytest.mark.parametrize("constraint", [ActuatorHorizontal(), ActuatorAngle(-0.5), FixedExtension(0.25)], ids=str)
 @pytest.mark.parametrize("position", [(0.0, 0.0, 4.0), (30.0, -40.0, 10.0), (1e6, 0.0, -1e6)])
-def test_out_of_reach_is_no_branch_and_no_error(position, hold):
-    assert inverse_kinematics(BOOM, position, DOWN, hold).solutions == ()
-    assert inverse_kinematics(BOOM, position, DOWN, hold).best is None
-    found = solve_branches(BOOM, position, DOWN, hold)
+def test_out_of_reach_is_no_branch_and_no_error(position, constraint):
+    assert inverse_kinematics(BOOM, position, DOWN, constraint).solutions == ()
+    assert inverse_kinematics(BOOM, position, DOWN, constraint).best is None
+    found = solve_branches(BOOM, position, DOWN, constraint)
     assert not found.exists.any()
     assert not found.within_limits.any()
     assert np.isnan(found.q).all()
 
 
 @pytest.mark.parametrize(
-    ("position", "hold"),
+    ("position", "constraint"),
     [
         ((1e200, 0.0, 1.0), ActuatorHorizontal()),
         ((1e200, 0.0, 1.0), FixedExtension(0.25)),
         ((1e5, 0.0, 1.15), ActuatorHorizontal()),  # a hand's breadth above the highest wrist, 100 km away
     ],
 )
-def test_coordinates_whose_squares_overflow_are_out_of_reach(position, hold):
-    assert inverse_kinematics(BOOM, position, DOWN, hold).solutions == ()
+def test_coordinates_whose_squares_overflow_are_out_of_reach(position, constraint):
+    assert inverse_kinematics(BOOM, position, DOWN, constraint).solutions == ()
 
 
 def over_the_yaw_axis() -> Array:
@@ -280,7 +280,7 @@ def over_the_yaw_axis() -> Array:
     return q
 
 
-@HOLDS
+@CONSTRAINTS
 def test_yaw_is_free_on_the_yaw_axis(kind):
     q = over_the_yaw_axis()
     tip = forward_kinematics(BOOM, q)
@@ -327,12 +327,12 @@ def test_rounding_below_a_yaw_of_0_is_not_a_whole_turn(y):
     assert abs(found.solutions[found.best].q[0]) < 1e-9
 
 
-@HOLDS
+@CONSTRAINTS
 def test_angles_are_turned_as_near_to_their_limits_as_can_be(kind):
     limits, turns = BOOM.limits, TURN * np.arange(-5, 6)[:, None] * ~IS_LENGTH
-    for q, hold in reachable(kind, 20, 100, seed=5):
+    for q, constraint in reachable(kind, 20, 100, seed=5):
         tip = forward_kinematics(BOOM, q)
-        found = solve_branches(BOOM, tip.position, tip.pitch, hold)
+        found = solve_branches(BOOM, tip.position, tip.pitch, constraint)
         branches = found.q[found.exists]
         options = branches[:, None] + turns
         least = np.maximum(np.maximum(limits.lower - options, options - limits.upper), 0.0).min(axis=1)
@@ -425,9 +425,9 @@ def test_the_best_branch_is_within_limits_however_near_another_is():
         pytest.param({"position": ("far", 0.0, 1.0)}, "position is not an array of numbers", id="text"),
         pytest.param({"pitch": np.nan}, "pitch is nan", id="nan pitch"),
         pytest.param({"pitch": [0.0, 1.0]}, "pitch", id="two pitches"),
-        pytest.param({"hold": ActuatorAngle(np.nan)}, "elevation is nan", id="nan elevation"),
-        pytest.param({"hold": FixedExtension(-np.inf)}, "extension is -inf", id="infinite extension"),
-        pytest.param({"hold": FixedExtension([0.0, 1.0])}, "extension", id="two extensions"),
+        pytest.param({"constraint": ActuatorAngle(np.nan)}, "elevation is nan", id="nan elevation"),
+        pytest.param({"constraint": FixedExtension(-np.inf)}, "extension is -inf", id="infinite extension"),
+        pytest.param({"constraint": FixedExtension([0.0, 1.0])}, "extension", id="two extensions"),
         pytest.param({"reference": (0, 1, np.nan, 0, 0)}, r"reference\[2\] is nan", id="nan reference"),
         pytest.param({"reference": (0, 1, 2, 0)}, r"reference has shape \(4,\)", id="four joints"),
         pytest.param({"reference": np.zeros((2, 5))}, "reference has shape", id="two references"),
@@ -443,20 +443,20 @@ def test_batches_that_do_not_match_are_bad_input():
         solve_branches(BOOM, np.zeros((4, 3)), np.zeros(3), ActuatorHorizontal())
 
 
-@pytest.mark.parametrize("hold", [ActuatorHorizontal(), FixedExtension(0.25)], ids=str)
+@pytest.mark.parametrize("constraint", [ActuatorHorizontal(), FixedExtension(0.25)], ids=str)
 @pytest.mark.parametrize(
     ("position_shape", "pitch_shape", "shape"),
     [((), (), ()), ((), (4,), (4,)), ((4,), (), (4,)), ((2, 3), (2, 3), (2, 3)), ((2, 1), (3,), (2, 3)), ((0,), (), (0,))],
 )
-def test_batches_are_their_targets_one_by_one(hold, position_shape, pitch_shape, shape):
+def test_batches_are_their_targets_one_by_one(constraint, position_shape, pitch_shape, shape):
     rng = np.random.default_rng(6)
     position = rng.uniform((-2.0, -2.0, 0.0), 2.0, (*position_shape, 3))
     pitch = rng.uniform(-np.pi, np.pi, pitch_shape)
-    found = solve_branches(BOOM, position, pitch, hold)
+    found = solve_branches(BOOM, position, pitch, constraint)
     assert (found.q.shape, found.exists.shape, found.within_limits.shape) == ((*shape, 4, 5), (*shape, 4), (*shape, 4))
     each_position, each_pitch = np.broadcast_to(position, (*shape, 3)), np.broadcast_to(pitch, shape)
     for index in np.ndindex(shape):
-        single = inverse_kinematics(BOOM, each_position[index], float(each_pitch[index]), hold)
+        single = inverse_kinematics(BOOM, each_position[index], float(each_pitch[index]), constraint)
         exists = found.exists[index]
         np.testing.assert_array_equal([s.q for s in single.solutions] or np.empty((0, 5)), found.q[index][exists])
         assert [s.within_limits for s in single.solutions] == list(found.within_limits[index][exists])
@@ -467,9 +467,9 @@ def test_batches_are_their_targets_one_by_one(hold, position_shape, pitch_shape,
 @pytest.mark.parametrize("error", [1e-7, 1e-6])
 def test_no_branch_is_false_with_the_wrist_at_the_shoulder(error):
     """There rho^2 + L6^2 = L9^2 leaves theta2 free, and any other extension cannot reach at all."""
-    hold = FixedExtension(np.sqrt(GEOMETRY.L9**2 - GEOMETRY.L6**2) - GEOMETRY.L7 + error)
+    constraint = FixedExtension(np.sqrt(GEOMETRY.L9**2 - GEOMETRY.L6**2) - GEOMETRY.L7 + error)
     position = np.array([GEOMETRY.L2, 0.0, GEOMETRY.L1 - GEOMETRY.L8])
-    found = solve_branches(BOOM, position, DOWN, hold)
+    found = solve_branches(BOOM, position, DOWN, constraint)
     assert (misses(found.q[found.exists], position, DOWN) < 1e-15).all()
 
 
@@ -479,12 +479,12 @@ def test_solutions_are_read_only():
 
 
 @pytest.mark.parametrize(
-    ("hold", "text"),
+    ("constraint", "text"),
     [
         (ActuatorHorizontal(), "horizontal"),
         (ActuatorAngle(np.radians(-30.0)), "actuator=-30 deg"),
         (FixedExtension(0.25), "extension=0.25 m"),
     ],
 )
-def test_holds_read_as_the_command_writes_them(hold, text):
-    assert str(hold) == text
+def test_holds_read_as_the_command_writes_them(constraint, text):
+    assert str(constraint) == text

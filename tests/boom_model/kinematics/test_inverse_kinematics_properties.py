@@ -1,4 +1,4 @@
-"""Any finite target, under any hold, has solutions or a reasoned refusal: no other exception, no NaN."""
+"""Any finite target, under any constraint, has solutions or a reasoned refusal: no other exception, no NaN."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from boom_model.errors import InfeasibleError, InputError
 from boom_model.kinematics.constraints import (
     ActuatorAngle,
     ActuatorHorizontal,
+    Constraint,
     FixedExtension,
-    Hold,
     LargestMargin,
     LeastExtension,
     LeastTorque,
@@ -58,104 +58,104 @@ CONSTRAINTS = st.just(ActuatorHorizontal()) | st.builds(ActuatorAngle, ANGLE) | 
 CHOICES = st.sampled_from([LeastExtension(), NearestHorizontal(), LeastTorque(), LargestMargin()]) | joints().map(
     NearestPose.to
 )
-HOLDS = CONSTRAINTS | CHOICES
+CONSTRAINTS = CONSTRAINTS | CHOICES
 
 
-def assert_sound(found: Solutions, position: tuple[float, float, float], hold: Hold) -> None:
-    """Every number is one; those within the limits reach the target and meet the hold; the best is one of them."""
+def assert_sound(found: Solutions, position: tuple[float, float, float], constraint: Constraint) -> None:
+    """Every number is one; those within the limits reach the target and meet the constraint; the best is one of them."""
     assert np.isfinite(found.pitch)
     for solution in found.solutions:
         assert np.isfinite(solution.q).all()
-        assert solution.within_limits == bool(LIMITS.hold(solution.q))
+        assert solution.within_limits == bool(LIMITS.contain(solution.q))
         if not solution.within_limits:
             assert solution.reasons
             continue
         tip = forward_kinematics(BOOM, solution.q)
         assert np.linalg.norm(tip.position - position) < 1e-12
         assert abs(np.remainder(tip.pitch - found.pitch + np.pi, TURN) - np.pi) < 2e-14
-        if isinstance(hold, FixedExtension):
-            assert abs(solution.q[3] - hold.extension) < 1e-14
-        if isinstance(hold, ActuatorAngle):
-            assert abs(np.remainder(solution.q[2] - hold.elevation, TURN) - np.pi) < 2e-14
+        if isinstance(constraint, FixedExtension):
+            assert abs(solution.q[3] - constraint.extension) < 1e-14
+        if isinstance(constraint, ActuatorAngle):
+            assert abs(np.remainder(solution.q[2] - constraint.elevation, TURN) - np.pi) < 2e-14
     assert (found.best is None) == (not any(s.within_limits for s in found.solutions))
     assert found.best is None or found.solutions[found.best].within_limits
 
 
 @BOUNDED
-@given(position=positions(NEAR), pitch=ANGLE, hold=HOLDS)
-def test_a_target_near_the_boom_has_sound_solutions_or_none(position, pitch, hold):
-    assert_sound(inverse_kinematics(BOOM, position, pitch, hold), position, hold)
+@given(position=positions(NEAR), pitch=ANGLE, constraint=CONSTRAINTS)
+def test_a_target_near_the_boom_has_sound_solutions_or_none(position, pitch, constraint):
+    assert_sound(inverse_kinematics(BOOM, position, pitch, constraint), position, constraint)
 
 
 @BOUNDED
-@given(position=positions(FINITE), pitch=FINITE, hold=HOLDS)
-@example(position=(0.0, 0.0, 0.0), pitch=6463426.0, hold=LeastExtension())
-@example(position=(0.0, 0.0, 0.0), pitch=190.0, hold=LeastExtension())
-def test_a_target_anywhere_has_sound_solutions_or_none(position, pitch, hold):
-    assert_sound(inverse_kinematics(BOOM, position, pitch, hold), position, hold)
+@given(position=positions(FINITE), pitch=FINITE, constraint=CONSTRAINTS)
+@example(position=(0.0, 0.0, 0.0), pitch=6463426.0, constraint=LeastExtension())
+@example(position=(0.0, 0.0, 0.0), pitch=190.0, constraint=LeastExtension())
+def test_a_target_anywhere_has_sound_solutions_or_none(position, pitch, constraint):
+    assert_sound(inverse_kinematics(BOOM, position, pitch, constraint), position, constraint)
 
 
 @BOUNDED
-@given(position=st.tuples(ANY, st.just(0.0), ANY), pitch=ANY, hold=CONSTRAINTS)
-def test_a_target_anywhere_at_all_has_sound_solutions_or_none_under_a_constraint(position, pitch, hold):
-    assert_sound(inverse_kinematics(BOOM, position, pitch, hold), position, hold)
+@given(position=st.tuples(ANY, st.just(0.0), ANY), pitch=ANY, constraint=CONSTRAINTS)
+def test_a_target_anywhere_at_all_has_sound_solutions_or_none_under_a_constraint(position, pitch, constraint):
+    assert_sound(inverse_kinematics(BOOM, position, pitch, constraint), position, constraint)
 
 
-@pytest.mark.parametrize("hold", [ActuatorHorizontal(), FixedExtension(0.2)], ids=str)
-def test_a_target_whose_radius_overflows_is_out_of_reach(hold):
-    assert inverse_kinematics(BOOM, (1.3e308, 1.3e308, 0.0), 0.0, hold).solutions == ()
+@pytest.mark.parametrize("constraint", [ActuatorHorizontal(), FixedExtension(0.2)], ids=str)
+def test_a_target_whose_radius_overflows_is_out_of_reach(constraint):
+    assert inverse_kinematics(BOOM, (1.3e308, 1.3e308, 0.0), 0.0, constraint).solutions == ()
 
 
 @FEW
-@given(position=positions(NEAR), hold=HOLDS)
-def test_a_position_alone_has_sound_solutions_or_none(position, hold):
-    assert_sound(inverse_kinematics(BOOM, position, None, hold), position, hold)
+@given(position=positions(NEAR), constraint=CONSTRAINTS)
+def test_a_position_alone_has_sound_solutions_or_none(position, constraint):
+    assert_sound(inverse_kinematics(BOOM, position, None, constraint), position, constraint)
 
 
 @BOUNDED
-@given(q=joints(), hold=CHOICES)
-def test_a_target_made_from_joints_within_the_limits_is_reached_by_every_choice(q, hold):
+@given(q=joints(), constraint=CHOICES)
+def test_a_target_made_from_joints_within_the_limits_is_reached_by_every_choice(q, constraint):
     tip = forward_kinematics(BOOM, q)
-    found = inverse_kinematics(BOOM, tip.position, float(tip.pitch), hold)
+    found = inverse_kinematics(BOOM, tip.position, float(tip.pitch), constraint)
     assert found.best is not None
-    assert_sound(found, tip.position, hold)
+    assert_sound(found, tip.position, constraint)
 
 
 @BOUNDED
 @given(q=joints(), reference=joints())
 def test_a_target_made_from_joints_within_the_limits_is_reached_by_the_hold_they_meet(q, reference):
     tip = forward_kinematics(BOOM, q)
-    hold = FixedExtension(float(q[3]))
-    found = inverse_kinematics(BOOM, tip.position, float(tip.pitch), hold, reference)
+    constraint = FixedExtension(float(q[3]))
+    found = inverse_kinematics(BOOM, tip.position, float(tip.pitch), constraint, reference)
     assert found.best is not None
-    assert_sound(found, tip.position, hold)
+    assert_sound(found, tip.position, constraint)
 
 
 @FEW
-@given(position=positions(NEAR), pitch=ANGLE, hold=HOLDS)
-def test_a_target_of_a_plan_is_reached_or_refused_with_a_reason(position, pitch, hold):
-    if inverse_kinematics(BOOM, position, pitch, hold).best is None:
+@given(position=positions(NEAR), pitch=ANGLE, constraint=CONSTRAINTS)
+def test_a_target_of_a_plan_is_reached_or_refused_with_a_reason(position, pitch, constraint):
+    if inverse_kinematics(BOOM, position, pitch, constraint).best is None:
         with pytest.raises(
             InfeasibleError, match=r"is out of reach; |can be reached only outside the limits \(branch 1: "
         ) as why:
-            resolve(BOOM, TipTarget(position), pitch, hold)
+            resolve(BOOM, TipTarget(position), pitch, constraint)
         assert "nan" not in str(why.value)
         return
-    q = resolve(BOOM, TipTarget(position), pitch, hold)
-    assert LIMITS.hold(q)
+    q = resolve(BOOM, TipTarget(position), pitch, constraint)
+    assert LIMITS.contain(q)
     assert np.linalg.norm(forward_kinematics(BOOM, q).position - position) < 1e-12
 
 
 @BOUNDED
-@given(q=joints(), shift=positions(st.floats(-0.1, 0.1) | st.just(0.0)), hold=CONSTRAINTS)
-def test_a_transform_is_reached_or_refused_with_a_reason(q, shift, hold):
+@given(q=joints(), shift=positions(st.floats(-0.1, 0.1) | st.just(0.0)), constraint=CONSTRAINTS)
+def test_a_transform_is_reached_or_refused_with_a_reason(q, shift, constraint):
     T = frame_transforms(BOOM, q, "inner")[10].copy()
     T[:3, 3] += shift
     if abs(np.dot(shift, T[:3, 2])) > 1e-6:
         with pytest.raises(InfeasibleError, match="its plane at yaw"):
-            inverse_kinematics_of_pose(BOOM, T, hold)
+            inverse_kinematics_of_pose(BOOM, T, constraint)
         return
-    found = inverse_kinematics_of_pose(BOOM, T, hold)
+    found = inverse_kinematics_of_pose(BOOM, T, constraint)
     for solution in found.solutions:
         assert np.isfinite(solution.q).all()
         reached = frame_transforms(BOOM, solution.q, "inner")[10]
@@ -172,9 +172,9 @@ def test_a_matrix_that_is_no_transform_is_bad_input(entries):
 
 
 @BOUNDED
-@given(bad=st.sampled_from([np.nan, np.inf, -np.inf]), at=st.integers(0, 3), hold=HOLDS)
-def test_what_is_not_finite_is_bad_input(bad, at, hold):
+@given(bad=st.sampled_from([np.nan, np.inf, -np.inf]), at=st.integers(0, 3), constraint=CONSTRAINTS)
+def test_what_is_not_finite_is_bad_input(bad, at, constraint):
     target = [1.4, 0.0, 1.0, -np.pi / 2]
     target[at] = bad
     with pytest.raises(InputError, match="must be a finite number"):
-        inverse_kinematics(BOOM, target[:3], target[3], hold)
+        inverse_kinematics(BOOM, target[:3], target[3], constraint)

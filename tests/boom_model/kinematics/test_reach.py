@@ -8,7 +8,7 @@ import pytest
 from boom_model.arrays import Array
 from boom_model.boom import LIMIT_TOLERANCE, Boom
 from boom_model.errors import InputError
-from boom_model.kinematics.constraints import ActuatorAngle, ActuatorHorizontal, FixedExtension, Hold
+from boom_model.kinematics.constraints import ActuatorAngle, ActuatorHorizontal, Constraint, FixedExtension
 from boom_model.kinematics.forward import forward_kinematics
 from boom_model.kinematics.inverse import solve_branches
 from boom_model.kinematics.reach import nearest_reachable
@@ -17,9 +17,9 @@ BOOM = Boom.load()
 DOWN, UP = -np.pi / 2, np.pi / 2
 
 
-def reached(position: Array, pitch: float, hold: Hold, within_limits: bool) -> Array:
+def reached(position: Array, pitch: float, constraint: Constraint, within_limits: bool) -> Array:
     """Whether any branch reaches each position (..., 3), within the limits if so asked."""
-    found = solve_branches(BOOM, position, pitch, hold)
+    found = solve_branches(BOOM, position, pitch, constraint)
     return (found.within_limits if within_limits else found.exists).any(axis=-1)
 
 
@@ -31,7 +31,7 @@ def stretched(extension: float) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("q", "hold", "share"),
+    ("q", "constraint", "share"),
     [
         pytest.param(stretched(0.25), FixedExtension(0.25), 3.0, id="too far for the stretched arm"),
         pytest.param(BOOM.pose("phenotyping"), ActuatorHorizontal(), 2.0, id="too far for the extended actuator"),
@@ -40,33 +40,33 @@ def stretched(extension: float) -> Array:
         pytest.param(stretched(0.25), FixedExtension(0.25), 1.0, id="just reachable"),
     ],
 )
-def test_the_nearest_point_is_where_the_boom_ends(q, hold, share):
+def test_the_nearest_point_is_where_the_boom_ends(q, constraint, share):
     tip = forward_kinematics(BOOM, q)
-    found = nearest_reachable(BOOM, share * tip.position, float(tip.pitch), hold)
+    found = nearest_reachable(BOOM, share * tip.position, float(tip.pitch), constraint)
     assert found.within_limits
     np.testing.assert_allclose(found.position, tip.position, rtol=0, atol=LIMIT_TOLERANCE)
     assert found.distance == pytest.approx(abs(share - 1.0) * np.linalg.norm(tip.position), abs=LIMIT_TOLERANCE)
 
 
-HOLDS = pytest.mark.parametrize("hold", [ActuatorHorizontal(), ActuatorAngle(-0.5), FixedExtension(0.25)], ids=str)
+CONSTRAINTS = pytest.mark.parametrize("constraint", [ActuatorHorizontal(), ActuatorAngle(-0.5), FixedExtension(0.25)], ids=str)
 PITCHES = pytest.mark.parametrize("pitch", [DOWN, 0.0, UP], ids=["down", "level", "up"])
 
 
-@HOLDS
+@CONSTRAINTS
 @PITCHES
-def test_no_point_of_the_line_is_nearer(hold, pitch):
+def test_no_point_of_the_line_is_nearer(constraint, pitch):
     rng = np.random.default_rng(1)
     for target in rng.uniform((-4.0, -4.0, -2.0), 4.0, (8, 3)):
-        found = nearest_reachable(BOOM, target, pitch, hold)
+        found = nearest_reachable(BOOM, target, pitch, constraint)
         length = np.linalg.norm(target)
         ahead = target / length
-        assert reached(found.position, pitch, hold, found.within_limits)
+        assert reached(found.position, pitch, constraint, found.within_limits)
         nearer = found.distance - 1e-6
         along = length + np.linspace(-nearer, nearer, 3001)
         line = along[along > 0.0, None] * ahead
-        assert found.distance < 1e-6 or not reached(line, pitch, hold, found.within_limits).any()
+        assert found.distance < 1e-6 or not reached(line, pitch, constraint, found.within_limits).any()
         if not found.within_limits:
-            assert not reached(np.linspace(0.0, 4.0, 5001)[:, None] * ahead, pitch, hold, True).any()
+            assert not reached(np.linspace(0.0, 4.0, 5001)[:, None] * ahead, pitch, constraint, True).any()
 
 
 @pytest.mark.parametrize(("length", "sense"), [(1.2, -1.0), (1.3, -1.0), (1.45, 1.0), (1.55, 1.0)])
@@ -88,11 +88,11 @@ def test_a_stretch_of_two_millimetres_is_found(rise):
     assert 0.09 < found.distance < 0.1
 
 
-@HOLDS
-def test_distance_and_position_agree(hold):
+@CONSTRAINTS
+def test_distance_and_position_agree(constraint):
     rng = np.random.default_rng(2)
     for target in rng.uniform((-4.0, -4.0, -2.0), 4.0, (8, 3)):
-        found = nearest_reachable(BOOM, target, DOWN, hold)
+        found = nearest_reachable(BOOM, target, DOWN, constraint)
         assert found.distance == pytest.approx(np.linalg.norm(found.position - target), abs=4e-15)
         assert np.linalg.norm(np.cross(found.position, target)) < 8e-15
         assert found.position @ target >= 0.0
@@ -142,7 +142,7 @@ def test_a_hold_beyond_the_limits_reaches_beyond_them():
 
 
 @pytest.mark.parametrize(
-    ("position", "pitch", "hold", "message"),
+    ("position", "pitch", "constraint", "message"),
     [
         pytest.param((1.0, np.nan, 1.0), DOWN, ActuatorHorizontal(), r"position\[1\] is nan", id="nan position"),
         pytest.param((1.0, 2.0), DOWN, ActuatorHorizontal(), r"position has shape \(2,\)", id="two coordinates"),
@@ -152,9 +152,9 @@ def test_a_hold_beyond_the_limits_reaches_beyond_them():
         pytest.param((1.0, 0.0, 1.0), DOWN, ActuatorAngle(np.nan), "elevation is nan", id="nan elevation"),
     ],
 )
-def test_bad_input_is_named(position, pitch, hold, message):
+def test_bad_input_is_named(position, pitch, constraint, message):
     with pytest.raises(InputError, match=message):
-        nearest_reachable(BOOM, position, pitch, hold)
+        nearest_reachable(BOOM, position, pitch, constraint)
 
 
 def test_the_point_is_read_only():

@@ -1,0 +1,48 @@
+"""Numbers and joint positions as people write them."""
+
+import numpy as np
+
+from boom_model.arrays import Array
+from boom_model.errors import InputError
+
+
+def joint_position(text: str, rest: str) -> Array:
+    """Return a joint position (5,) in SI from five numbers with commas: degrees, the extension in metres.
+
+    Args:
+        text: what a message quotes.
+        rest: the numbers.
+
+    Raises:
+        InputError: the numbers are malformed, not finite, or too many or too few.
+    """
+    q = np.array(numbers(text, rest, 5))
+    q[[0, 1, 2, 4]] = np.radians(q[[0, 1, 2, 4]])
+    return q
+
+
+def numbers(text: str, rest: str, count: int) -> list[float]:
+    """Return the `count` finite numbers with commas of `rest`.
+
+    Raises:
+        InputError: they are malformed, not finite, or too many or too few; quotes `text`.
+    """
+    parts = rest.split(",")
+    if len(parts) != count:
+        raise InputError(f"{text!r} has {len(parts)} numbers; it needs {count}")
+    return [number(text, part, "a number") for part in parts]
+
+
+def number(name: str, text: str, what: str) -> float:
+    """Return a finite number.
+
+    Raises:
+        InputError: `text` is not `what`, or not finite.
+    """
+    try:
+        value = float(text)
+    except ValueError:
+        raise InputError(f"{name}: {text!r} is not {what}") from None
+    if not np.isfinite(value):
+        raise InputError(f"{name}: {text!r} must be finite")
+    return value
