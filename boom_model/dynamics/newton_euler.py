@@ -15,8 +15,10 @@ U = Q A, the force on the set is U_o, and its moment about any pin a sum of b_i 
 upper, outer, inner and lower link gives the joint torques and the pin forces from these (eqs. 2.45-2.71).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import tan
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -118,16 +120,16 @@ def inverse_dynamics(
         np.empty((count, 6)) if reactions else None,
     )
     model = _model(boom, payload_as)
-    rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives])
+    rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) if drive_inertia else None
     for start in range(0, count, _CHUNK):
         part = slice(start, start + _CHUNK)
-        state = _State(*(np.ascontiguousarray(x[part].T) for x in motion))
-        plane = _plane(boom, state, *(x[part].T for x in outside))
-        applied = _Applied(*(None if x is None else _into_plane(state, x[part].T) for x in (push, twist)))
+        state = _state(*(x[part] for x in motion))
+        plane = _plane(boom, state, *(_columns(x[part]) for x in outside))
+        applied = _Applied(*(None if x is None else _into_plane(state, _columns(x[part])) for x in (push, twist)))
         _newton_euler(model, state, plane, applied, out.part(part))
         if friction:
             out.tau[part] += boom.friction.torque(motion[1][part])
-        if drive_inertia:
+        if rotors is not None:
             out.tau[part] += rotors * motion[2][part]
     return Loads(
         tau=out.tau.reshape(*shape, 5),
@@ -213,30 +215,45 @@ def _pseudo_inertia(body: Body, R: Array) -> Array:
     return moments
 
 
-class _State(NamedTuple):
-    """A chunk of states, each (5, n)."""
+_Value = Array | float
+"""(n,) of a chunk, or the number of a single state: Python's own arithmetic is ten times quicker on it than NumPy's."""
 
-    q: Array
-    qd: Array
-    qdd: Array
+
+class _State(NamedTuple):
+    """A chunk of states, each five values."""
+
+    q: Sequence[_Value]
+    qd: Sequence[_Value]
+    qdd: Sequence[_Value]
+
+
+def _state(*motion: Array) -> _State:
+    if len(motion[0]) == 1:
+        return _State(*(x[0].tolist() for x in motion))
+    return _State(*(list(np.ascontiguousarray(x.T)) for x in motion))
+
+
+def _columns(vectors: Array) -> Sequence[_Value]:
+    """The x, y and z of vectors (n, 3)."""
+    return vectors[0].tolist() if len(vectors) == 1 else list(vectors.T)
 
 
 class _Plane(NamedTuple):
     """How the arm's plane moves, along its axes x, z and n; three entries (n,) or 0 each."""
 
-    lift: tuple[Array | float, Array | float, Array | float]
+    lift: tuple[_Value, _Value, _Value]
     """minus gravity"""
-    a: tuple[Array | float, Array | float, Array | float]
+    a: tuple[_Value, _Value, _Value]
     """a0 minus gravity"""
-    W: tuple[Array | float, Array, Array | float]
-    W1: tuple[Array | float, Array, Array | float]
+    W: tuple[_Value, _Value, _Value]
+    W1: tuple[_Value, _Value, _Value]
 
 
 class _Applied(NamedTuple):
-    """Force and moment on the tip along the plane's axes, (3, n) each."""
+    """Force and moment on the tip along the plane's axes."""
 
-    force: Array | None
-    moment: Array | None
+    force: tuple[_Value, _Value, _Value] | None
+    moment: tuple[_Value, _Value, _Value] | None
 
 
 class _Outputs(NamedTuple):
@@ -261,13 +278,13 @@ def _vectors(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise InputError(f"{name} has shape {values.shape}; it does not match states of shape {(*shape, 5)}") from None
 
 
-def _into_plane(state: _State, vector: Array) -> Array:
-    """(3, n) along frame 1 to x, z and n of the plane."""
+def _into_plane(state: _State, vector: Sequence[_Value]) -> tuple[_Value, _Value, _Value]:
+    """A vector along frame 1 to x, z and n of the plane."""
     c, s = _cosine_and_sine(state.q[0])
-    return np.stack([c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]])
+    return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
 
 
-def _plane(boom: Boom, state: _State, *base: Array) -> _Plane:
+def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     rate, accel = state.qd[0], state.qdd[0]
     if not base:
         level = (0.0, boom.gravity, 0.0)
@@ -275,17 +292,18 @@ def _plane(boom: Boom, state: _State, *base: Array) -> _Plane:
     angular_velocity, angular_acceleration, acceleration, up = (_into_plane(state, x) for x in base)
     w1, w2, w3 = angular_velocity
     d1, d2, d3 = angular_acceleration
-    lift = boom.gravity * up
-    a = acceleration + lift
+    lift = (boom.gravity * up[0], boom.gravity * up[1], boom.gravity * up[2])
+    a = (acceleration[0] + lift[0], acceleration[1] + lift[1], acceleration[2] + lift[2])
     # The yaw axis is the plane's z: W' = base's + theta1'' z + W_base x theta1' z (thesis, eq. 2.40).
-    return _Plane(
-        (lift[0], lift[1], lift[2]), (a[0], a[1], a[2]), (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1)
-    )
+    return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1))
 
 
-def _accelerations(state: _State, plane: _Plane, C: Array, S: Array, rho: Array) -> Array:
-    """A, the acceleration of each vector b: (3, 11, n) along x, z and n. C, S (3, n): cosine and sine of theta2, 3, t."""
-    A = np.empty((3, 11, C.shape[1]))
+def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> Array:
+    """A, the acceleration of each vector b: (3, 11, n) along x, z and n, or (3, 11) of a single state.
+
+    C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
+    """
+    A = np.empty((3, 11, *np.shape(rho)))
     w1, w2, w3 = plane.W
     d1, d2, d3 = plane.W1
     w11, w22, w33, w12, w13, w23 = w1 * w1, w2 * w2, w3 * w3, w1 * w2, w1 * w3, w2 * w3
@@ -320,21 +338,21 @@ def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied
     """Fills the outputs of a chunk."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
-    C, S = _cosine_and_sine(np.stack([q[1], q[2], q[2] + q[4]]))
-    A = _accelerations(state, plane, C, S, rho)
+    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[1], q[2], q[2] + q[4]))
+    A = _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), rho)
     rows = model.rows if out.pins is not None else model.rows[:11]
-    U = rows @ A
+    U = rows @ A if A.ndim == 3 else A @ rows.T
     if model.hanging:
-        weight = [np.broadcast_to(-model.hanging * np.asarray(x), rho.shape) for x in plane.lift]
-        _put_on(U, model.payload, np.stack(weight))
+        _put_on(
+            U, model.payload, (-model.hanging * plane.lift[0], -model.hanging * plane.lift[1], -model.hanging * plane.lift[2])
+        )
     if applied.force is not None:
         _put_on(U, model.tip, applied.force)
-    moment = np.zeros((3, 1)) if applied.moment is None else applied.moment
-    (c2, c3, ct), (s2, s3, st) = C, S
+    moment = (0.0, 0.0, 0.0) if applied.moment is None else applied.moment
 
-    def about(c: Array, s: Array, e: Array, p: Array) -> Array:
+    def about(c: _Value, s: _Value, e: Array, p: Array) -> _Value:
         """(b_e x U_e + b_p x U_p) . n"""
-        turned: Array = c * (e[1] - p[0]) - s * (e[0] + p[1])
+        turned: _Value = c * (e[1] - p[0]) - s * (e[0] + p[1])
         return turned
 
     on_tool = about(ct, st, U[:, _ET], U[:, _PT]) - moment[2]
@@ -357,7 +375,7 @@ def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied
     sine = s3 * c2 - c3 * s2
     with np.errstate(divide="ignore", invalid="ignore"):
         along_inner, along_lower = -M_top / (g.L5 * sine), -M_outer / (g.L4 * sine)
-        f7 = along_inner * np.stack([c2, s2]) + along_lower * np.stack([c3, s3])
+        f7 = np.stack([along_inner * c2 + along_lower * c3, along_inner * s2 + along_lower * s3])
     for pin, force in enumerate((F_outer[:2] + f7, f7, F_top[:2] - f7)):
         out.pins[pin, :, 0], out.pins[pin, :, 2] = force
 
@@ -372,15 +390,18 @@ def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied
     out.mount[:, 5] = -out.tau[:, 0]
 
 
-def _cosine_and_sine(angle: Array) -> tuple[Array, Array]:
+def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
     """By the tangent of half the angle, to 3e-16: NumPy's tangent is vectorised for doubles, its cosine and sine are not."""
-    t = np.tan(0.5 * angle)
+    t = tan(0.5 * angle) if isinstance(angle, float) else np.tan(0.5 * angle)
     u = 2.0 / (1.0 + t * t)
     return u - 1.0, u * t
 
 
-def _put_on(U: Array, g: Array, force: Array) -> None:
-    """Takes a force (3, n) at the point g off what the bodies need, in place."""
-    U[:, :11] -= g[:, None] * force[:, None]
-    if U.shape[1] > 11:
-        U[:, 14:] -= g[[_O, _E3, _P3], None] * force[:, None]
+def _put_on(U: Array, g: Array, force: tuple[_Value, _Value, _Value]) -> None:
+    """Take a force at the point g off what the bodies need, in place."""
+    for row, along in zip(U, force, strict=True):
+        taken = np.multiply.outer(g, along)
+        taken = taken if taken.ndim == row.ndim else taken[:, None]  # the same force in every state
+        row[:11] -= taken
+        if len(row) > 11:
+            row[14:] -= taken[[_O, _E3, _P3]]
