@@ -70,6 +70,8 @@ MOUNT_LOAD = Range(1.0, 1e8, "N or Nm")
 # Around it
 POSITION = Range(-1e3, 1e3, "m")
 """A place in frame 1."""
+NUMBER = Range(-1e4, 1e4, "")
+"""Of a target, a pitch or a hold as people write it: degrees or metres."""
 SIZE = Range(1e-3, 1e3, "m")
 """Of a shape to keep away from."""
 CLEARANCE = Range(0.0, 10.0, "m")
@@ -78,11 +80,19 @@ CLEARANCE = Range(0.0, 10.0, "m")
 DURATION = Range(1e-3, 1e7, "s")
 TIME = Range(-1e9, 1e11, "s")
 """A sample's: the clock of a computer, too."""
-MOTION = Range(-1e9, 1e9, "in SI")
+MOTION = Range(-1e9, 1e9, "")
 """A sample's position, velocity or acceleration of a joint, and its torque."""
 RATE = Range(1e-2, 1e6, "Hz")
+WINDOW = Range(1e-6, 1e5, "s")
+"""Of a filter."""
 LIFE = Range(1e-3, 1e7, "h")
 TIP_TOLERANCE = Range(1e-3, 1e4, "mm")
+
+# Controllers
+BANDWIDTH = Range(1e-3, 1e5, "Hz")
+DAMPING = Range(1e-3, 1e3, "")
+INTEGRAL = Range(0.0, 1e3, "")
+PAYLOAD_ERROR = Range(-5e3, 5e3, "kg")
 
 # The vehicle
 SLOPE = Range(-90.0, 90.0, "deg")

@@ -16,8 +16,8 @@ from boom_model.errors import InputError
 from boom_model.kinematics.frames import R_LINK_BODY
 from boom_model.link_design.beam import Beam, Support
 from boom_model.link_design.materials import Material
-from boom_model.provenance import Basis, Origin
 from boom_model.plausible import MASS, THICKNESS, WIDTH
+from boom_model.provenance import Basis, Origin
 from boom_model.toml_file import Table, read_toml
 
 LINKS_FILE = Path(str(files("boom_model") / "data" / "links.toml"))

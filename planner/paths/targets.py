@@ -22,6 +22,7 @@ from boom_model import (
     nearest_reachable,
 )
 from boom_model.arrays import Array, checked
+from boom_model.plausible import NUMBER
 
 PITCHES = {"down": -np.pi / 2.0, "level": 0.0, "up": np.pi / 2.0}
 CHOICES = {
@@ -189,4 +190,5 @@ def _number(name: str, text: str, what: str) -> float:
         raise InputError(f"{name}: {text!r} is not {what}") from None
     if not np.isfinite(value):
         raise InputError(f"{name}: {text!r} must be finite")
+    NUMBER.require(name, value)
     return value

@@ -255,7 +255,7 @@ def test_validate_holds(boom):
         (("view", "none.rrd"), 2, "none.rrd"),
         (("plan", "transport", "phenotyping", "--csv", "move.rrd"), 2, "it is to hold two things"),
         (("plan", "transport", "phenotyping", "--out", "."), 2, "cannot be written"),
-        (("plan", "transport", "phenotyping", "--duration", "1e9"), 2, "make more than 10,000,000 samples"),
+        (("plan", "transport", "phenotyping", "--duration", "2e5"), 2, "make more than 10,000,000 samples"),
         (("plan", "transport", "phenotyping", "--along", "line"), 2, "is no tip target"),
         (("check", "twice.csv"), 2, "has twice the column q1"),
         (("plan", "transport", "phenotyping", "--jerk-bound"), 2, "jerk_bound is for the time-optimal profile"),

@@ -211,7 +211,7 @@ def test_a_folder_that_takes_no_file_keeps_what_it_had(planned, tmp_path, monkey
         raise PermissionError(13, "Permission denied")
 
     (tmp_path / name).write_text("old")
-    monkeypatch.setattr("tempfile.mkstemp", refuse)  # a folder's mode stops no superuser
+    monkeypatch.setattr("tempfile.mkdtemp", refuse)  # a folder's mode stops no superuser
     with pytest.raises(InputError, match="cannot be written: Permission denied"):
         write_document(tmp_path / name, "# New\n", planned[1])
     assert os.listdir(tmp_path) == [name]
