@@ -28,7 +28,7 @@ def checked(name: str, values: ArrayLike, last: int | None = None) -> Array:
     """
     try:
         array: Array = np.asarray(values, dtype=float)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
         raise InputError(f"{name} is not an array of numbers: {error}") from None
     if last is not None and (array.ndim == 0 or array.shape[-1] != last):
         raise InputError(f"{name} has shape {array.shape}; its last axis must have length {last}")

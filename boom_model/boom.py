@@ -14,6 +14,27 @@ from boom_model.drives.drive import Drive
 from boom_model.drives.linear_actuator import LinearDrive
 from boom_model.errors import InputError
 from boom_model.keep_out import KeepOut
+from boom_model.plausible import (
+    ACCELERATION,
+    ANGLE,
+    ANGULAR_ACCELERATION,
+    ANGULAR_JERK,
+    ANGULAR_VELOCITY,
+    COULOMB_FRICTION,
+    GRAVITY,
+    INERTIA,
+    JERK,
+    LENGTH,
+    LINKAGE_ANGLE,
+    MASS,
+    MOUNT_LOAD,
+    OFFSET,
+    TRANSMISSION_ANGLE,
+    VELOCITY,
+    VISCOUS_FRICTION,
+    WIDTH,
+    Range,
+)
 from boom_model.provenance import Origin, Sourced
 
 JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
@@ -32,6 +53,9 @@ LIMIT_TOLERANCE = 1e-9
 """Slack [rad or m] of every comparison with a position limit: rounding is not a violation."""
 
 
+_LENGTHS = {"L1": OFFSET, "L2": OFFSET, "L3": LENGTH, "L4": LENGTH, "L6": OFFSET, "L7": LENGTH, "L8": WIDTH}
+
+
 @dataclass(frozen=True, eq=False)
 class Geometry:
     """Lengths [m] of the thesis's figure 2-1. L5 = L3 and L9 = L4: the linkage is a parallelogram."""
@@ -43,6 +67,10 @@ class Geometry:
     L6: float
     L7: float
     L8: float
+
+    def __post_init__(self) -> None:
+        for name, quantity in _LENGTHS.items():
+            quantity.require(name, scalar(name, getattr(self, name)))
 
     @property
     def L5(self) -> float:
@@ -63,6 +91,20 @@ class Body:
     inertia: Array
     """(3, 3) about the centre of mass, along the axes of the body's frame [kg m^2]."""
 
+    def __post_init__(self) -> None:
+        MASS.require("a body's mass", scalar("a body's mass", self.mass))
+        OFFSET.require("a body's centre of mass", _of_shape("a body's centre of mass", self.com, (3,)))
+        INERTIA.require("a body's inertia", _of_shape("a body's inertia", self.inertia, (3, 3)))
+
+
+_LIMITS: dict[str, tuple[Range, Range]] = {
+    "lower": (ANGLE, OFFSET),
+    "upper": (ANGLE, OFFSET),
+    "velocity": (ANGULAR_VELOCITY, VELOCITY),
+    "acceleration": (ANGULAR_ACCELERATION, ACCELERATION),
+    "jerk": (ANGULAR_JERK, JERK),
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Limits:
@@ -79,6 +121,14 @@ class Limits:
     """Transmission angle [rad] below which the flattening parallelogram's pin forces deserve a warning."""
     origins: Mapping[str, tuple[Origin, ...]]
     """Origin of every figure: keys position, velocity, acceleration and jerk (5 each), linkage and transmission (1)."""
+
+    def __post_init__(self) -> None:
+        for name, (angular, linear) in _LIMITS.items():
+            values = _of_shape(name, getattr(self, name), (5,))
+            angular.require(f"{name} limit of a joint", np.degrees(values[~IS_LENGTH]))
+            linear.require(f"{name} limit of the extension", values[IS_LENGTH])
+        LINKAGE_ANGLE.require("linkage", np.degrees(scalar("linkage", self.linkage)))
+        TRANSMISSION_ANGLE.require("transmission", np.degrees(scalar("transmission", self.transmission)))
 
     def excess(self, q: ArrayLike) -> Array:
         """How far q is outside each position limit, shape (..., 6); negative inside.
@@ -124,8 +174,12 @@ class Friction:
     origins: tuple[Origin | None, ...]
     """Of each joint's pair; None where none is given."""
 
+    def __post_init__(self) -> None:
+        VISCOUS_FRICTION.require("viscous friction", _of_shape("viscous friction", self.viscous, (5,)))
+        COULOMB_FRICTION.require("coulomb friction", _of_shape("coulomb friction", self.coulomb, (5,)))
+
     def torque(self, qd: ArrayLike) -> Array:
-        """Torque [Nm, the extension's N] that overcomes friction at joint velocities qd (..., 5), of the same shape."""
+        """Return the torque [Nm, the extension's N] that overcomes friction at joint velocities qd (..., 5), same shape."""
         qd = np.asarray(qd, dtype=float)
         torque: Array = self.viscous * qd + self.coulomb * np.sign(qd)
         return torque
@@ -139,6 +193,11 @@ class Mount:
     """Largest force [N]."""
     moment: Sourced[float] | None
     """Largest moment about the origin of frame 1 [Nm]."""
+
+    def __post_init__(self) -> None:
+        for name, load in (("mount force", self.force), ("mount moment", self.moment)):
+            if load is not None:
+                MOUNT_LOAD.require(name, load.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +224,13 @@ class Boom:
     keep_out: KeepOut | None = None
     """What the arm must keep away from; None where nobody says."""
 
+    def __post_init__(self) -> None:
+        GRAVITY.require("gravity", scalar("gravity", self.gravity))
+        for name, q in self.poses.items():
+            angles = _of_shape(f"pose {name!r}", q, (5,))
+            ANGLE.require(f"pose {name!r}", np.degrees(angles[~IS_LENGTH]))
+            OFFSET.require(f"pose {name!r}", angles[IS_LENGTH])
+
     @staticmethod
     def load(path: str | Path | None = None, catalogue: str | Path | None = None) -> "Boom":
         """The third-generation boom (thesis, Appendix C and table 2-3), or one described by a TOML file of the same form.
@@ -184,11 +250,10 @@ class Boom:
         """The same boom with a payload of another mass [kg]: same centre of mass, inertia in proportion.
 
         Raises:
-            InputError: not finite, or negative.
+            InputError: not finite, negative or beyond what is plausible.
         """
         mass = scalar("payload", mass)
-        if mass < 0:
-            raise InputError(f"payload is {mass} kg; it must be at least 0 kg")
+        MASS.require("payload", mass)
         old = self.payload
         inertia = old.inertia * (mass / old.mass) if old.mass > 0.0 else old.inertia
         return replace(self, payload=Body(mass, old.com, read_only(inertia)))
@@ -197,7 +262,7 @@ class Boom:
         """The same boom with a body of another mass [kg]: same centre of mass, inertia in proportion.
 
         Raises:
-            InputError: no such body, a mass that is not finite or negative, or a body without mass to scale.
+            InputError: no such body, a mass that is not finite or not plausible, or a body without mass to scale.
         """
         if name not in self.bodies:
             raise InputError(f"unknown body {name!r}; there are: {', '.join(self.bodies)}")
@@ -241,6 +306,13 @@ class Boom:
     def mass(self) -> float:
         """Total mass without payload [kg]."""
         return sum(body.mass for body in self.bodies.values())
+
+
+def _of_shape(name: str, values: Array, shape: tuple[int, ...]) -> Array:
+    array = checked(name, values)
+    if array.shape != shape:
+        raise InputError(f"{name} has shape {array.shape}; it must be {shape}")
+    return array
 
 
 def _shown(joint: int, value: float) -> str:

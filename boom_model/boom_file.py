@@ -1,6 +1,6 @@
 """The TOML form of a boom: schema, validation, and conversion to SI."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
@@ -16,14 +16,44 @@ from boom_model.drives.drive import Drive, Wiring
 from boom_model.drives.linear_actuator import LinearDrive
 from boom_model.errors import InputError
 from boom_model.keep_out import Box, Capsule, KeepOut
+from boom_model.plausible import (
+    ACCELERATION,
+    ANGLE,
+    ANGULAR_ACCELERATION,
+    ANGULAR_JERK,
+    ANGULAR_VELOCITY,
+    CLEARANCE,
+    COULOMB_FRICTION,
+    GRAVITY,
+    INERTIA,
+    JERK,
+    LENGTH,
+    LINKAGE_ANGLE,
+    MASS,
+    MOUNT_LOAD,
+    OFFSET,
+    POSITION,
+    SIZE,
+    TRANSMISSION_ANGLE,
+    VELOCITY,
+    VISCOUS_FRICTION,
+    VOLTAGE,
+    WIDTH,
+)
 from boom_model.provenance import Basis, Origin, Sourced
-from boom_model.toml_file import Finite, NonNegative, Positive, Table, read_toml
+from boom_model.toml_file import Table, read_toml
 
 BOOM_FILE = Path(str(files("boom_model") / "data" / "third_generation.toml"))
 
 V = TypeVar("V")
 BasisName = Literal["printed", "estimated", "assumed"]
-Triple = Annotated[list[Finite], Field(min_length=3, max_length=3)]
+_Mass = Annotated[float, MASS]
+_Offset = Annotated[float, OFFSET]
+Triple = Annotated[list[_Offset], Field(min_length=3, max_length=3)]
+_Place = Annotated[list[Annotated[float, POSITION]], Field(min_length=3, max_length=3)]
+_Gap = Annotated[float, CLEARANCE]
+_Viscous = Annotated[float, VISCOUS_FRICTION]
+_Coulomb = Annotated[float, COULOMB_FRICTION]
 
 
 def inertia_tensor(value: Any) -> Array:
@@ -32,8 +62,10 @@ def inertia_tensor(value: Any) -> Array:
         given = checked("inertia", value)
     except InputError:
         given = np.empty(0)
-    if given.shape not in ((3,), (3, 3)) or isinstance(value, str):
-        raise ValueError(f"must be [Ixx, Iyy, Izz] or a 3 x 3 matrix, of finite numbers (it is {value})")
+    if given.shape not in ((3,), (3, 3)) or not all(type(entry) in (int, float) for entry in _entries(value)):
+        raise ValueError("must be [Ixx, Iyy, Izz] or a 3 x 3 matrix, of finite numbers")
+    if not np.abs(given).max() <= INERTIA.high:
+        raise ValueError(f"an entry is {given.flat[np.abs(given).argmax()]:g} {INERTIA.unit}; the bound is {INERTIA.high:g}")
     tensor = read_only(np.diag(given) if given.ndim == 1 else given)
     if not np.allclose(tensor, tensor.T, rtol=1e-12, atol=0.0):
         raise ValueError("the inertia must be symmetric")
@@ -42,6 +74,12 @@ def inertia_tensor(value: Any) -> Array:
         shown = ", ".join(f"{p:.6g}" for p in principal)
         raise ValueError(f"no body has principal inertias {shown}: the two smaller ones must sum to the largest or more")
     return tensor
+
+
+def _entries(value: Any) -> Iterator[Any]:
+    """What stands in a list of numbers or of such lists."""
+    for part in value if isinstance(value, list) else [value]:
+        yield from part if isinstance(part, list) else [part]
 
 
 class _Origin(Table):
@@ -62,8 +100,8 @@ class _Sourced(_Origin, Generic[V]):
 
 
 class _Range(_Origin):
-    lower: Finite
-    upper: Finite
+    lower: float
+    upper: float
 
     @model_validator(mode="after")
     def _ordered(self) -> "_Range":
@@ -72,18 +110,28 @@ class _Range(_Origin):
         return self
 
 
+class _AngleRange(_Range):
+    lower: Annotated[float, ANGLE]
+    upper: Annotated[float, ANGLE]
+
+
+class _StrokeRange(_Range):
+    lower: _Offset
+    upper: _Offset
+
+
 class _GeometryTable(Table):
-    L1_m: Finite
-    L2_m: Finite
-    L3_m: Positive
-    L4_m: Positive
-    L6_m: Finite
-    L7_m: Positive
-    L8_m: NonNegative
+    L1_m: _Offset
+    L2_m: _Offset
+    L3_m: Annotated[float, LENGTH]
+    L4_m: Annotated[float, LENGTH]
+    L6_m: _Offset
+    L7_m: Annotated[float, LENGTH]
+    L8_m: Annotated[float, WIDTH]
 
 
 class _BodyTable(Table):
-    mass_kg: NonNegative
+    mass_kg: _Mass
     com_m: Triple
     inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)]
 
@@ -91,7 +139,7 @@ class _BodyTable(Table):
 class _DriveTable(Table):
     motor: str
     gearbox: str
-    bus_voltage_V: _Sourced[Positive] | None = None
+    bus_voltage_V: _Sourced[Annotated[float, VOLTAGE]] | None = None
     wiring: _Sourced[Literal["parallel", "series"]] | None = None
     brake: _Sourced[bool] | None = None
 
@@ -102,8 +150,8 @@ class _ActuatorTable(Table):
 
 
 class _RevoluteFriction(_Origin):
-    viscous_Nm_s_per_rad: NonNegative
-    coulomb_Nm: NonNegative
+    viscous_Nm_s_per_rad: _Viscous
+    coulomb_Nm: _Coulomb
 
     @property
     def pair(self) -> tuple[float, float]:
@@ -112,8 +160,8 @@ class _RevoluteFriction(_Origin):
 
 
 class _PrismaticFriction(_Origin):
-    viscous_N_s_per_m: NonNegative
-    coulomb_N: NonNegative
+    viscous_N_s_per_m: _Viscous
+    coulomb_N: _Coulomb
 
     @property
     def pair(self) -> tuple[float, float]:
@@ -121,10 +169,10 @@ class _PrismaticFriction(_Origin):
 
 
 class _RevoluteTable(Table):
-    position_deg: _Range
-    velocity_deg_s: _Sourced[Positive]
-    acceleration_deg_s2: _Sourced[Positive]
-    jerk_deg_s3: _Sourced[Positive]
+    position_deg: _AngleRange
+    velocity_deg_s: _Sourced[Annotated[float, ANGULAR_VELOCITY]]
+    acceleration_deg_s2: _Sourced[Annotated[float, ANGULAR_ACCELERATION]]
+    jerk_deg_s3: _Sourced[Annotated[float, ANGULAR_JERK]]
     friction: _RevoluteFriction | None = None
     drive: _DriveTable | None = None
 
@@ -136,10 +184,10 @@ class _RevoluteTable(Table):
 
 
 class _PrismaticTable(Table):
-    position_m: _Range
-    velocity_m_s: _Sourced[Positive]
-    acceleration_m_s2: _Sourced[Positive]
-    jerk_m_s3: _Sourced[Positive]
+    position_m: _StrokeRange
+    velocity_m_s: _Sourced[Annotated[float, VELOCITY]]
+    acceleration_m_s2: _Sourced[Annotated[float, ACCELERATION]]
+    jerk_m_s3: _Sourced[Annotated[float, JERK]]
     friction: _PrismaticFriction | None = None
     actuator: _ActuatorTable | None = None
 
@@ -167,32 +215,32 @@ class _BodiesTable(Table):
 
 
 class _LinkageTable(Table):
-    minimum_angle_deg: _Sourced[NonNegative]
-    transmission_warning_deg: _Sourced[NonNegative]
+    minimum_angle_deg: _Sourced[Annotated[float, LINKAGE_ANGLE]]
+    transmission_warning_deg: _Sourced[Annotated[float, TRANSMISSION_ANGLE]]
 
 
 class _MountTable(Table):
-    force_N: _Sourced[Positive] | None = None
-    moment_Nm: _Sourced[Positive] | None = None
+    force_N: _Sourced[Annotated[float, MOUNT_LOAD]] | None = None
+    moment_Nm: _Sourced[Annotated[float, MOUNT_LOAD]] | None = None
 
 
 class _BoxTable(_Origin):
     name: str
-    center_m: Triple
-    size_m: Annotated[list[Positive], Field(min_length=3, max_length=3)]
+    center_m: _Place
+    size_m: Annotated[list[Annotated[float, SIZE]], Field(min_length=3, max_length=3)]
 
 
 class _CapsuleTable(_Origin):
     name: str
-    start_m: Triple
-    end_m: Triple
-    radius_m: Positive
+    start_m: _Place
+    end_m: _Place
+    radius_m: Annotated[float, SIZE]
 
 
 class _KeepOutTable(_Origin):
-    clearance_m: NonNegative
-    link_radius_m: NonNegative
-    payload_radius_m: NonNegative
+    clearance_m: _Gap
+    link_radius_m: _Gap
+    payload_radius_m: _Gap
     box: list[_BoxTable] = Field(default_factory=list)
     capsule: list[_CapsuleTable] = Field(default_factory=list)
 
@@ -208,22 +256,22 @@ class _KeepOutTable(_Origin):
 
 
 class _PayloadTable(_Origin):
-    mass_kg: NonNegative
+    mass_kg: _Mass
     com_m: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
     inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)] = Field(default_factory=lambda: read_only(np.zeros((3, 3))))
 
 
 class _PoseTable(Table):
-    yaw_deg: Finite
-    inner_deg: Finite
-    lower_deg: Finite
-    extension_m: Finite
-    wrist_deg: Finite
+    yaw_deg: Annotated[float, ANGLE]
+    inner_deg: Annotated[float, ANGLE]
+    lower_deg: Annotated[float, ANGLE]
+    extension_m: _Offset
+    wrist_deg: Annotated[float, ANGLE]
 
 
 class _BoomTable(Table):
     name: str
-    gravity_m_s2: NonNegative = 9.81
+    gravity_m_s2: Annotated[float, GRAVITY] = 9.81
     geometry: _GeometryTable
     bodies: _BodiesTable
     payload: _PayloadTable
@@ -241,6 +289,11 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
     known = Catalogue.load().with_file(catalogue)
     joints = [getattr(table.joints, joint) for joint in JOINTS]
     g = table.geometry
+    limits = _limits(joints, table.linkage)
+    poses = {name: _pose(pose) for name, pose in table.poses.items()}
+    for name, q in poses.items():
+        if broken := limits.reasons(q):
+            raise InputError(f"{file}: key poses.{name}: outside the limits: {'; '.join(broken)}")
     return Boom(
         name=table.name,
         gravity=table.gravity_m_s2,
@@ -249,13 +302,13 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
         payload=_body(table.payload),
         friction=_friction(joints),
         mount=Mount(_given(table.mount.force_N), _given(table.mount.moment_Nm)),
-        limits=_limits(joints, table.linkage),
+        limits=limits,
         drives=tuple(
             _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), known, catalogue)
             for name, joint in zip(JOINTS, joints, strict=True)
         ),
         actuator=_linear_drive(file, table.joints.extension.actuator, known, catalogue),
-        poses=MappingProxyType({name: _pose(pose) for name, pose in table.poses.items()}),
+        poses=MappingProxyType(poses),
         keep_out=None if table.keep_out is None else _keep_out(table.keep_out),
     )
 

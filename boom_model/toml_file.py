@@ -9,9 +9,7 @@ from pydantic_core import ErrorDetails
 
 from boom_model.errors import InputError
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Table(BaseModel):
@@ -21,6 +19,8 @@ class Table(BaseModel):
 
 
 Schema = TypeVar("Schema", bound=Table)
+
+_LONGEST = 40  # digits or letters of a value that a message shows
 
 
 def read_toml(path: Path, schema: type[Schema]) -> Schema:
@@ -33,8 +33,10 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:  # not TOML, not UTF-8, or an integer of thousands of digits
         raise InputError(f"{path}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: arrays or tables are nested too deep") from None
     try:
         return schema.model_validate(data)
     except ValidationError as error:
@@ -48,5 +50,12 @@ def _sentence(error: ErrorDetails) -> str:
     if error["type"] == "extra_forbidden":
         return f"key {key} is not known"
     value = error["input"]
-    shown = f" (it is {value!r})" if isinstance(value, int | float | str) else ""
+    shown = f" (it is {_shown(value)})" if isinstance(value, int | float | str) else ""
     return f"key {key}: {error['msg'][0].lower()}{error['msg'][1:]}{shown}"
+
+
+def _shown(value: int | float | str) -> str:
+    if isinstance(value, int) and abs(value) >= 10**_LONGEST:
+        return f"an integer of more than {_LONGEST} digits"
+    text = repr(value)
+    return text if len(text) <= 2 * _LONGEST else f"{text[:_LONGEST]}..."

@@ -4,6 +4,7 @@ import numpy as np
 
 from boom_model.arrays import Array
 from boom_model.errors import InputError
+from boom_model.plausible import NUMBER
 
 
 def joint_position(text: str, rest: str) -> Array:
@@ -45,4 +46,5 @@ def number(name: str, text: str, what: str) -> float:
         raise InputError(f"{name}: {text!r} is not {what}") from None
     if not np.isfinite(value):
         raise InputError(f"{name}: {text!r} must be finite")
+    NUMBER.require(name, value)
     return value

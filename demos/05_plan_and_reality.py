@@ -14,7 +14,10 @@ import pyarrow as pa
 from pyarrow import csv
 
 from boom_model import JOINTS, Boom
-from planner import compare, plan, read_csv, read_log, torques, write_csv
+from planner import compare, plan
+from planner.experiments.comparison import read_log
+from planner.motion.trajectory import read_csv, write_csv
+from planner.planning import torques
 from planner.recording import write_comparison_recording
 
 DELAY, CLOCK, PLAY, NOISE = 0.015, 3.2, np.radians(0.1), 5e-5

@@ -7,7 +7,8 @@ single changes that work; each has been planned again before it is offered.
 """
 
 from boom_model import Boom, InfeasibleError
-from planner import MoveSpec, plan_move
+from planner import MoveSpec
+from planner.planning import plan_move
 from planner.suggestions import suggestions
 
 

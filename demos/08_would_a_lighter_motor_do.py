@@ -8,10 +8,10 @@ The picture shows the drives that the boom has, on the same day in the field.
 import sys
 
 from boom_model import Boom, Catalogue
-from planner import check_cycle, choose, load_mission, plan_cycle
+from planner import check_cycle, load_mission, plan_cycle
 from planner.planning import torques
 from planner.reports.drive_pictures import write_drive_picture
-from planner.sizing.choice import parse_variant
+from planner.sizing.choice import choose, parse_variant
 
 
 def main(out: str = "drives.png") -> None:

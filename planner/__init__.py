@@ -1,93 +1,64 @@
-"""From targets to motions that have been checked, and to what people keep of them: reports, recordings, CSV."""
+"""Moves that are planned and checked, and what people keep of them: reports, recordings, files.
 
-from boom_model.kinematics.constraints import parse_constraint
-from planner.checks.certificate import Certificate, WorstRatio, certify
-from planner.checks.evaluation import Evaluation, evaluate
-from planner.checks.kinds import CheckKind
-from planner.checks.motion_checks import average_torque
-from planner.checks.rows import Row, Verdict
-from planner.checks.stopping import Stop, WorstStop, stop
-from planner.experiments.comparison import Comparison, Log, compare, read_log
-from planner.exports.robot_models import mjcf, urdf, write_model
-from planner.links.design import LinkDesign, LinkTask, design_link
-from planner.missions.mission import Cycle, Leg, Mission, check_cycle, load_mission, plan_cycle
-from planner.motion.motion_files import read_motion, write_motion
-from planner.motion.planned import PlannedMotion
-from planner.motion.trajectory import Trajectory, read_csv, sample, write_csv
-from planner.move_spec import MoveSpec
-from planner.paths.path import JointLine, Path
-from planner.paths.targets import TipTarget, parse_pitch, parse_target
-from planner.planning import Move, check, examine, plan, plan_motion, plan_move, torques
-from planner.reports.report import Report
-from planner.sizing.choice import Adapt, Choice, Judged, candidates, choose, size
-from planner.timing.path_limits import InfeasiblePathError
-from planner.timing.profile import Cubic, JerkLimited, Profile, Quintic, TimeOptimal, Trapezoidal
-from planner.timing.time_law import Motion, TimeLaw
+`planner` offers what a notebook starts with; the rest stands in its rooms (`planner.checks.certificate` and so on). A name is
+imported when it is first used, so that the command answers to a signal from its first moment.
+"""
 
-__all__ = [
-    "Adapt",
-    "Certificate",
-    "CheckKind",
-    "Choice",
-    "Comparison",
-    "Cubic",
-    "Cycle",
-    "Evaluation",
-    "InfeasiblePathError",
-    "JerkLimited",
-    "JointLine",
-    "Judged",
-    "Leg",
-    "LinkDesign",
-    "LinkTask",
-    "Log",
-    "Mission",
-    "Motion",
-    "Move",
-    "MoveSpec",
-    "Path",
-    "PlannedMotion",
-    "Profile",
-    "Quintic",
-    "Report",
-    "Row",
-    "Stop",
-    "TimeLaw",
-    "TimeOptimal",
-    "TipTarget",
-    "Trajectory",
-    "Trapezoidal",
-    "Verdict",
-    "WorstRatio",
-    "WorstStop",
-    "average_torque",
-    "candidates",
-    "certify",
-    "check",
-    "check_cycle",
-    "choose",
-    "compare",
-    "design_link",
-    "evaluate",
-    "examine",
-    "load_mission",
-    "mjcf",
-    "parse_constraint",
-    "parse_pitch",
-    "parse_target",
-    "plan",
-    "plan_cycle",
-    "plan_motion",
-    "plan_move",
-    "read_csv",
-    "read_log",
-    "read_motion",
-    "sample",
-    "size",
-    "stop",
-    "torques",
-    "urdf",
-    "write_csv",
-    "write_model",
-    "write_motion",
-]
+from importlib import import_module
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from planner.checks.rows import Verdict as Verdict
+    from planner.experiments.comparison import compare as compare
+    from planner.links.design import LinkTask as LinkTask
+    from planner.links.design import design_link as design_link
+    from planner.missions.mission import check_cycle as check_cycle
+    from planner.missions.mission import load_mission as load_mission
+    from planner.missions.mission import plan_cycle as plan_cycle
+    from planner.motion.motion_files import read_motion as read_motion
+    from planner.motion.motion_files import write_motion as write_motion
+    from planner.motion.trajectory import Trajectory as Trajectory
+    from planner.move_spec import MoveSpec as MoveSpec
+    from planner.paths.targets import TipTarget as TipTarget
+    from planner.planning import Move as Move
+    from planner.planning import check as check
+    from planner.planning import plan as plan
+    from planner.planning import plan_motion as plan_motion
+    from planner.reports.report import Report as Report
+    from planner.sizing.choice import size as size
+    from planner.timing.profile import Cubic as Cubic
+    from planner.timing.profile import JerkLimited as JerkLimited
+    from planner.timing.profile import Quintic as Quintic
+    from planner.timing.profile import TimeOptimal as TimeOptimal
+    from planner.timing.profile import Trapezoidal as Trapezoidal
+
+_HOMES = {
+    "planner.checks.rows": ("Verdict",),
+    "planner.experiments.comparison": ("compare",),
+    "planner.links.design": ("LinkTask", "design_link"),
+    "planner.missions.mission": ("check_cycle", "load_mission", "plan_cycle"),
+    "planner.motion.motion_files": ("read_motion", "write_motion"),
+    "planner.motion.trajectory": ("Trajectory",),
+    "planner.move_spec": ("MoveSpec",),
+    "planner.paths.targets": ("TipTarget",),
+    "planner.planning": ("Move", "check", "plan", "plan_motion"),
+    "planner.reports.report": ("Report",),
+    "planner.sizing.choice": ("size",),
+    "planner.timing.profile": ("Cubic", "JerkLimited", "Quintic", "TimeOptimal", "Trapezoidal"),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> object:
+    if name == "__version__":
+        return version("boom")
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from boom_model import Boom, inverse_dynamics
 from boom_model.arrays import Array
-from planner import Motion
+from planner.timing.time_law import Motion
 
 DRIVEN = (1, 2)
 RATIO, EFFICIENCY, NO_LOAD, START_STOP = 160.0, 0.65, 0.42, 460.0  # CBG320160; Nm

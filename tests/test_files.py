@@ -12,7 +12,7 @@ def test_new_file_takes_the_place_of_the_old_one(tmp_path):
     path = tmp_path / "out.txt"
     path.write_text("old")
     with replacing(path) as temporary:
-        assert os.path.dirname(temporary) == str(tmp_path)
+        assert os.path.dirname(os.path.dirname(temporary)) == str(tmp_path)
         with open(temporary, "w") as file:
             file.write("new")
         assert path.read_text() == "old"

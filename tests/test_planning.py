@@ -7,24 +7,14 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, FixedExtension, InputError, LeastTorque, forward_kinematics, inverse_dynamics
-from planner import (
-    MoveSpec,
-    Profile,
-    Quintic,
-    TimeOptimal,
-    TipTarget,
-    Verdict,
-    check,
-    evaluate,
-    plan,
-    plan_motion,
-    plan_move,
-)
+from planner import MoveSpec, Quintic, TimeOptimal, TipTarget, Verdict, check, plan, plan_motion
+from planner.checks.evaluation import evaluate
 from planner.checks.kinds import CheckKind
 from planner.motion.trajectory import COLUMNS, TORQUES
 from planner.motion.vehicle import LEVEL, load_case
+from planner.planning import plan_move
 from planner.timing.limit_ratios import limit_ratios
-from planner.timing.profile import PROFILES, parse_profile
+from planner.timing.profile import PROFILES, Profile, parse_profile
 from tests.limits import START_STOP, motor_allows, worst
 
 BOOM = Boom.load()

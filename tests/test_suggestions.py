@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from boom_model import JOINTS, Boom, InfeasibleError, forward_kinematics, inverse_dynamics
-from planner import MoveSpec, Profile, Verdict, plan
+from planner import MoveSpec, Verdict, plan
 from planner.suggestions import suggestions
+from planner.timing.profile import Profile
 from tests.limits import EFFICIENCY, INERTIA, motor_allows
 from tests.paths.test_keep_out import POST, ROUND_POST, with_shapes
 

@@ -14,37 +14,37 @@ from pydantic import Field, model_validator
 from boom_model.drives.drive import Gearbox, Motor, Winding
 from boom_model.drives.linear_actuator import LinearActuator
 from boom_model.errors import InputError
-from boom_model.toml_file import Finite, Table, read_toml
+from boom_model.plausible import (
+    ACCURACY,
+    ACTUATOR_SPEED,
+    CURRENT,
+    DRIVE_MASS,
+    EFFICIENCY,
+    FORCE,
+    INDUCTANCE,
+    INPUT_INERTIA,
+    INPUT_SPEED,
+    LEAD,
+    PERCENT,
+    PLAY,
+    RATED_LIFE,
+    RATIO,
+    RESISTANCE,
+    ROTOR_INERTIA,
+    STEP_ANGLE,
+    STIFFNESS,
+    STROKE,
+    TEMPERATURE,
+    TORQUE,
+    VOLTAGE,
+)
+from boom_model.toml_file import Table, read_toml
 
 CATALOGUE_FILE = Path(str(files("boom_model") / "data" / "catalogue.toml"))
 
 _RPM = 2.0 * np.pi / 60.0
 
-# Wide enough for any drive that is built; beyond is a slip of units.
 _Text = Annotated[str, Field(min_length=1)]
-_Ratio = Annotated[float, Field(ge=1, le=1e4, allow_inf_nan=False)]
-_Step = Annotated[float, Field(ge=0.1, le=90, allow_inf_nan=False)]
-_Angle = Annotated[float, Field(gt=0, le=90, allow_inf_nan=False)]
-_Percent = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
-_Efficiency = Annotated[float, Field(ge=1, le=100, allow_inf_nan=False)]
-"""From 1 %: 0.65 is a share."""
-_Mass = Annotated[float, Field(ge=1e-3, le=1e4, allow_inf_nan=False)]
-_Torque = Annotated[float, Field(ge=1e-4, le=1e6, allow_inf_nan=False)]
-_Force = Annotated[float, Field(ge=1e-3, le=1e7, allow_inf_nan=False)]
-_Current = Annotated[float, Field(ge=1e-2, le=1e3, allow_inf_nan=False)]
-_Resistance = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
-_Inductance = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
-_Voltage = Annotated[float, Field(ge=0.1, le=1e3, allow_inf_nan=False)]
-_RotorInertia = Annotated[float, Field(ge=1e-4, le=1e4, allow_inf_nan=False)]
-_InputInertia = Annotated[float, Field(ge=1e-9, le=1.0, allow_inf_nan=False)]
-_Stiffness = Annotated[float, Field(ge=1e-3, le=1e4, allow_inf_nan=False)]
-"""[Nm/mrad]: 1e4 is several times the largest strain-wave gearbox; a figure in Nm/rad is mostly beyond."""
-_Play = Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)]
-_InputSpeed = Annotated[float, Field(ge=0.1, le=1e5, allow_inf_nan=False)]
-_Life = Annotated[float, Field(ge=1, le=1e7, allow_inf_nan=False)]
-_Speed = Annotated[float, Field(ge=1e-5, le=100, allow_inf_nan=False)]
-_Stroke = Annotated[float, Field(ge=1e-3, le=100, allow_inf_nan=False)]
-_Lead = Annotated[float, Field(ge=1e-2, le=1e4, allow_inf_nan=False)]
 
 
 @dataclass(frozen=True)
@@ -86,31 +86,36 @@ class Catalogue:
 
 
 class _WindingTable(Table):
-    current_A: _Current
-    resistance_ohm: _Resistance
-    inductance_mH: _Inductance
-    voltage_V: _Voltage | None = None
+    current_A: Annotated[float, CURRENT]
+    resistance_ohm: Annotated[float, RESISTANCE]
+    inductance_mH: Annotated[float, INDUCTANCE]
+    voltage_V: Annotated[float, VOLTAGE] | None = None
 
 
 class _MotorTable(Table):
     """What no check uses (phase voltage, temperatures, shaft loads) stands in the file for its readers."""
 
     source: _Text
-    tolerance_percent: _Percent | None = None
-    step_deg: _Step
-    full_step_accuracy_deg: _Angle | None = None
-    microstep_accuracy_deg: _Angle | None = None
-    max_voltage_V: _Voltage | None = None
-    holding_torque_Nm: _Torque | None = None
-    running_torque_Nm: _Torque | None = None
-    mass_kg: _Mass | None = None
-    rotor_inertia_kg_cm2: _RotorInertia | None = None
-    ambient_degC: Annotated[list[Finite], Field(min_length=2, max_length=2)] | None = None
-    max_operating_degC: Finite | None = None
-    max_radial_load_kg: _Mass | None = None
-    max_thrust_load_kg: _Mass | None = None
+    tolerance_percent: Annotated[float, PERCENT] | None = None
+    step_deg: Annotated[float, STEP_ANGLE]
+    full_step_accuracy_deg: Annotated[float, ACCURACY] | None = None
+    microstep_accuracy_deg: Annotated[float, ACCURACY] | None = None
+    max_voltage_V: Annotated[float, VOLTAGE] | None = None
+    holding_torque_Nm: Annotated[float, TORQUE] | None = None
+    running_torque_Nm: Annotated[float, TORQUE] | None = None
+    mass_kg: Annotated[float, DRIVE_MASS] | None = None
+    rotor_inertia_kg_cm2: Annotated[float, ROTOR_INERTIA] | None = None
+    ambient_degC: Annotated[list[Annotated[float, TEMPERATURE]], Field(min_length=2, max_length=2)] | None = None
+    max_operating_degC: Annotated[float, TEMPERATURE] | None = None
+    max_radial_load_kg: Annotated[float, DRIVE_MASS] | None = None
+    max_thrust_load_kg: Annotated[float, DRIVE_MASS] | None = None
     parallel: _WindingTable | None = None
     series: _WindingTable | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "_MotorTable":
+        _require_order("running_torque_Nm", self.running_torque_Nm, "holding_torque_Nm", self.holding_torque_Nm)
+        return self
 
 
 _RATINGS = ("max_average_torque_Nm", "start_stop_torque_Nm", "peak_torque_Nm")
@@ -119,35 +124,34 @@ _RATINGS = ("max_average_torque_Nm", "start_stop_torque_Nm", "peak_torque_Nm")
 
 class _GearboxTable(Table):
     source: _Text
-    ratio: _Ratio
-    continuous_torque_Nm: _Torque | None = None
-    start_stop_torque_Nm: _Torque | None = None
-    max_average_torque_Nm: _Torque | None = None
-    peak_torque_Nm: _Torque | None = None
-    efficiency_percent: _Efficiency | None = None
-    no_load_input_torque_Nm: _Torque | None = None
-    starting_torque_Nm: _Torque | None = None
-    backdrive_torque_Nm: _Torque | None = None
-    mass_kg: _Mass | None = None
-    input_inertia_kg_m2: _InputInertia | None = None
-    torsion_T1_Nm: _Torque | None = None
-    torsion_T2_Nm: _Torque | None = None
-    torsion_K1_Nm_per_mrad: _Stiffness | None = None
-    torsion_K2_Nm_per_mrad: _Stiffness | None = None
-    torsion_K3_Nm_per_mrad: _Stiffness | None = None
-    backlash_mrad: _Play | None = None
-    hysteresis_mrad: _Play | None = None
-    max_input_speed_rpm: _InputSpeed | None = None
-    max_average_input_speed_rpm: _InputSpeed | None = None
-    rated_life_h: _Life | None = None
-    rated_input_speed_rpm: _InputSpeed | None = None
+    ratio: Annotated[float, RATIO]
+    continuous_torque_Nm: Annotated[float, TORQUE] | None = None
+    start_stop_torque_Nm: Annotated[float, TORQUE] | None = None
+    max_average_torque_Nm: Annotated[float, TORQUE] | None = None
+    peak_torque_Nm: Annotated[float, TORQUE] | None = None
+    efficiency_percent: Annotated[float, EFFICIENCY] | None = None
+    no_load_input_torque_Nm: Annotated[float, TORQUE] | None = None
+    starting_torque_Nm: Annotated[float, TORQUE] | None = None
+    backdrive_torque_Nm: Annotated[float, TORQUE] | None = None
+    mass_kg: Annotated[float, DRIVE_MASS] | None = None
+    input_inertia_kg_m2: Annotated[float, INPUT_INERTIA] | None = None
+    torsion_T1_Nm: Annotated[float, TORQUE] | None = None
+    torsion_T2_Nm: Annotated[float, TORQUE] | None = None
+    torsion_K1_Nm_per_mrad: Annotated[float, STIFFNESS] | None = None
+    torsion_K2_Nm_per_mrad: Annotated[float, STIFFNESS] | None = None
+    torsion_K3_Nm_per_mrad: Annotated[float, STIFFNESS] | None = None
+    backlash_mrad: Annotated[float, PLAY] | None = None
+    hysteresis_mrad: Annotated[float, PLAY] | None = None
+    max_input_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
+    max_average_input_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
+    rated_life_h: Annotated[float, RATED_LIFE] | None = None
+    rated_input_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> "_GearboxTable":
         given = [name for name in _RATINGS if getattr(self, name) is not None]
         for low, high in pairwise(given):
-            if getattr(self, low) > getattr(self, high):
-                raise ValueError(f"{high} is {getattr(self, high):g}, less than {low}, which is {getattr(self, low):g}")
+            _require_order(low, getattr(self, low), high, getattr(self, high))
         T1, T2 = self.torsion_T1_Nm, self.torsion_T2_Nm
         if T1 is not None and T2 is not None and T1 >= T2:
             raise ValueError(f"torsion_T1_Nm is {T1:g}; it must be below torsion_T2_Nm, which is {T2:g}")
@@ -156,22 +160,27 @@ class _GearboxTable(Table):
 
 class _ActuatorTable(Table):
     source: _Text
-    rated_force_N: _Force | None = None
-    peak_force_N: _Force | None = None
-    static_force_N: _Force | None = None
-    max_speed_m_s: _Speed | None = None
-    stroke_m: _Stroke | None = None
-    lead_mm: _Lead | None = None
-    efficiency_percent: _Efficiency | None = None
-    backdrive_force_N: _Force | None = None
-    duty_percent: _Percent | None = None
-    mass_kg: _Mass | None = None
+    rated_force_N: Annotated[float, FORCE] | None = None
+    peak_force_N: Annotated[float, FORCE] | None = None
+    static_force_N: Annotated[float, FORCE] | None = None
+    max_speed_m_s: Annotated[float, ACTUATOR_SPEED] | None = None
+    stroke_m: Annotated[float, STROKE] | None = None
+    lead_mm: Annotated[float, LEAD] | None = None
+    efficiency_percent: Annotated[float, EFFICIENCY] | None = None
+    backdrive_force_N: Annotated[float, FORCE] | None = None
+    duty_percent: Annotated[float, PERCENT] | None = None
+    mass_kg: Annotated[float, DRIVE_MASS] | None = None
 
 
 class _CatalogueTable(Table):
     motors: dict[str, _MotorTable] = Field(default_factory=dict)
     gearboxes: dict[str, _GearboxTable] = Field(default_factory=dict)
     actuators: dict[str, _ActuatorTable] = Field(default_factory=dict)
+
+
+def _require_order(low: str, least: float | None, high: str, most: float | None) -> None:
+    if least is not None and most is not None and least > most:
+        raise ValueError(f"{high} is {most:g}, less than {low}, which is {least:g}")
 
 
 def _scaled(value: float | None, factor: float) -> float | None:

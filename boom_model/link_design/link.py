@@ -16,8 +16,9 @@ from boom_model.errors import InputError
 from boom_model.kinematics.frames import R_LINK_BODY
 from boom_model.link_design.beam import Beam, Support
 from boom_model.link_design.materials import Material
+from boom_model.plausible import MASS, THICKNESS, WIDTH
 from boom_model.provenance import Basis, Origin
-from boom_model.toml_file import NonNegative, Positive, Table, read_toml
+from boom_model.toml_file import Table, read_toml
 
 LINKS_FILE = Path(str(files("boom_model") / "data" / "links.toml"))
 
@@ -178,7 +179,7 @@ def _pseudo_inertia(body: Body) -> Array:
 
 
 class _FittingsTable(Table):
-    mass_kg: NonNegative
+    mass_kg: Annotated[float, MASS]
     com_m: Triple
     inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)]
     basis: Literal["printed", "estimated", "assumed"]
@@ -186,12 +187,12 @@ class _FittingsTable(Table):
 
 
 class _LinkTable(Table):
-    width_m: Positive
-    plates: Annotated[int, Field(ge=1)]
-    spacing_m: NonNegative
+    width_m: Annotated[float, THICKNESS]
+    plates: Annotated[int, Field(ge=1, le=100)]
+    spacing_m: Annotated[float, WIDTH]
     designed_from: Annotated[float, Field(ge=0, lt=1)] = 0.0
     designed_to: Annotated[float, Field(gt=0, le=1)] = 1.0
-    cross_plates: Annotated[int, Field(ge=0)] = 0
+    cross_plates: Annotated[int, Field(ge=0, le=1000)] = 0
     basis: Literal["printed", "estimated", "assumed"]
     source: str
     fittings: _FittingsTable | None = None

@@ -1,32 +1,28 @@
 """The command `boom`: parsing and printing, nothing else. What is slow to import is imported by the command that needs it."""
 
+import errno
+import os
 import sys
 
 import click
 
-from boom_model import BoomError, InfeasibleError
+from boom_model import InputError
 from planner.cli import control, drives, files, kinematics, link, moves
-from planner.cli.printing import ANSWER_IS_NO, BAD_INPUT, complain, quieten
+from planner.cli.failures import failure
+from planner.cli.printing import quieten
 
 
 def main() -> None:
-    """Run the command; exit 0 done, 1 the answer is no, 2 bad input with one line on standard error."""
+    """Run the command; exit 0 done, 1 the answer is no, 2 bad input, 70 an internal error, each but 0 with one line."""
     try:
+        if sys.stdout is None:
+            raise InputError("standard output is closed")
         code = cli.main(prog_name="boom", standalone_mode=False)
-    except click.ClickException as error:
-        complain(error.format_message())
-        code = BAD_INPUT
-    except (MemoryError, OverflowError) as error:
-        complain(f"too large to compute: {error}")
-        code = BAD_INPUT
-    except click.Abort:
-        code = 130
-    except InfeasibleError as error:
-        complain(str(error))
-        code = ANSWER_IS_NO
-    except BoomError as error:
-        complain(str(error))
-        code = BAD_INPUT
+        sys.stdout.flush()
+    except SystemExit as stop:  # click ends by itself after shell completion, and, with 1, where a pipe has lost its reader
+        code = failure(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))) if stop.code else 0
+    except (Exception, KeyboardInterrupt) as error:
+        code = failure(error)
     sys.exit(code)
 
 

@@ -5,21 +5,32 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
 from boom_model import InputError
+from boom_model.plausible import BANDWIDTH, DAMPING, DURATION, INTEGRAL, PAYLOAD_ERROR, TIP_TOLERANCE
 from planner.cli.options import (
     boom_option,
-    check_report,
     hold_option,
     json_option,
     load_boom,
+    outputs,
     payload_option,
     pitch_option,
+    plausible,
     report_option,
     vehicle_option,
 )
-from planner.cli.printing import ANSWER_IS_NO, STYLES, new_console, new_table, print_files, print_json, print_lines, tracked
+from planner.cli.printing import (
+    ANSWER_IS_NO,
+    STYLES,
+    complain,
+    new_console,
+    new_table,
+    print_files,
+    print_json,
+    print_lines,
+    tracked,
+)
 
 if TYPE_CHECKING:
     from planner.control.study import Study
@@ -43,14 +54,35 @@ if TYPE_CHECKING:
 @click.option("--pass-via", is_flag=True, help="As in `boom plan`.")
 @click.option("--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z", help="As in `boom plan`.")
 @click.option("--jerk-bound", is_flag=True, help="As in `boom plan`.")
-@click.option("--bandwidth", default=6.0, show_default=True, metavar="HZ", help="Natural frequency of the loops' poles.")
-@click.option("--damping", default=1.0, show_default=True, help="Damping ratio of the loops' poles.")
-@click.option("--integral", default=0.3, show_default=True, help="Integral action's pole, as a share of the bandwidth.")
-@click.option("--duration", type=float, metavar="S", help="As in `boom plan`.")
+@click.option(
+    "--bandwidth",
+    default=6.0,
+    callback=plausible(BANDWIDTH),
+    show_default=True,
+    metavar="HZ",
+    help="Natural frequency of the loops' poles.",
+)
+@click.option(
+    "--damping", default=1.0, callback=plausible(DAMPING), show_default=True, help="Damping ratio of the loops' poles."
+)
+@click.option(
+    "--integral",
+    default=0.3,
+    callback=plausible(INTEGRAL),
+    show_default=True,
+    help="Integral action's pole, as a share of the bandwidth.",
+)
+@click.option("--duration", type=float, callback=plausible(DURATION), metavar="S", help="As in `boom plan`.")
 @pitch_option
 @hold_option
 @payload_option
-@click.option("--payload-error", default=0.0, metavar="KG", help="True payload less the one that the controllers believe in.")
+@click.option(
+    "--payload-error",
+    default=0.0,
+    callback=plausible(PAYLOAD_ERROR),
+    metavar="KG",
+    help="True payload less the one that the controllers believe in.",
+)
 @click.option(
     "--gust",
     metavar="FX,FY,FZ,START,DURATION",
@@ -60,7 +92,14 @@ if TYPE_CHECKING:
 @click.option("--rigid-links", is_flag=True, help="Leave out the bending of inner link and extension.")
 @click.option("--backlash", is_flag=True, help="With the gearboxes' backlash.")
 @click.option("--compensate-sag", is_flag=True, help="Send the motors ahead by the twist that the weight gives.")
-@click.option("--settle-mm", default=1.0, show_default=True, metavar="MM", help="Within which the tip counts as settled.")
+@click.option(
+    "--settle-mm",
+    default=1.0,
+    callback=plausible(TIP_TOLERANCE),
+    show_default=True,
+    metavar="MM",
+    help="Within which the tip counts as settled.",
+)
 @click.option(
     "--set", "figures", multiple=True, metavar="NAME=VALUE",
     help="A figure that is assumed otherwise, as the report names it: rate_Hz, structural_damping, ...; may be given again.",
@@ -121,15 +160,12 @@ def control(
     from planner.control.plant import Plant
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
-    from planner.files import check_writable
     from planner.motion.vehicle import LEVEL, load_case
     from planner.move_spec import MoveSpec
     from planner.planning import plan_move
     from planner.timing.profile import Profile, parse_profile
 
     boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
-    if not np.isfinite(settle_mm) or not settle_mm > 0.0:
-        raise InputError(f"settle-mm is {settle_mm:g}; it must be a finite number above 0")
     setup = Setup(
         goals=Goals.of(bandwidth, damping, integral),
         figures=parse_figures(figures),
@@ -151,8 +187,7 @@ def control(
             raise InputError(f"{name}: a picture is written as .png")
     if loops is not None and chosen[0] == [Controller.STEPPER]:
         raise InputError("a stepper runs open loop: there is no Bode diagram of it")
-    check_report(document)
-    check_writable(out, loops, errors, document)
+    files = outputs(out, loops, errors, document=document, inputs=(boom_file, vehicle))
     specs = [
         MoveSpec.of(
             start,
@@ -174,24 +209,25 @@ def control(
     if left_out:
         found = replace(found, notes=(*found.notes, "stepper: left out, as it is simulated behind elastic gearboxes alone"))
     written = {}
-    if out is not None:
-        from planner.recording import write_control_recording
+    with files:
+        if out is not None:
+            from planner.recording import write_control_recording
 
-        write_control_recording(out, found)
-        written["recording"] = out
-    if loops is not None or errors is not None:
-        from planner.control.picture import error_figure, loop_figure, write_figure
+            write_control_recording(files.temporary(out), found)
+            written["recording"] = out
+        if loops is not None or errors is not None:
+            from planner.control.picture import error_figure, loop_figure, write_figure
 
-        for kind, name, figure in (("loops", loops, loop_figure), ("errors", errors, error_figure)):
-            if name is not None:
-                write_figure(name, figure(found))
-                written[kind] = name
-    if document is not None:
-        from planner.control.picture import study_pictures
-        from planner.reports.document import write_document
+            for kind, name, figure in (("loops", loops, loop_figure), ("errors", errors, error_figure)):
+                if name is not None:
+                    write_figure(files.temporary(name), figure(found))
+                    written[kind] = name
+        if document is not None:
+            from planner.control.picture import study_pictures
+            from planner.reports.document import write_document
 
-        write_document(document, found.to_markdown(), study_pictures(found))
-        written["report"] = document
+            write_document(files.temporary(document), found.to_markdown(), study_pictures(found))
+            written["report"] = document
     return _print_study(found, written, as_json)
 
 
@@ -200,7 +236,7 @@ def _print_study(study: "Study", written: dict[str, str], as_json: bool) -> int:
 
     if as_json:
         print_json(study.to_json(written))
-        return ANSWER_IS_NO if study.failed else 0
+        return _code(study)
     console = new_console()
     table = new_table(*ROW_HEADER)
     for row in study.rows:
@@ -220,6 +256,12 @@ def _print_study(study: "Study", written: dict[str, str], as_json: bool) -> int:
     console.print(study.modes_sentence, highlight=False, soft_wrap=True)
     console.print(study.summary, style="bold red" if study.failed else None, highlight=False, soft_wrap=True)
     print_files(written)
+    return _code(study)
+
+
+def _code(study: "Study") -> int:
+    if study.failed:
+        complain(study.summary)
     return ANSWER_IS_NO if study.failed else 0
 
 

@@ -5,21 +5,23 @@ from typing import Any
 import click
 
 from boom_model import InfeasibleError, InputError
+from boom_model.plausible import VOLTAGE
 from planner.cli.options import (
     boom_option,
     check_picture,
-    check_report,
     given_catalogue,
     json_option,
     load_boom,
     load_vehicle,
+    outputs,
     payload_as_option,
     payload_option,
     picture_option,
+    plausible,
     report_option,
     vehicle_option,
 )
-from planner.cli.printing import ANSWER_IS_NO, print_files, print_json, print_lines, print_report, print_rows, tracked
+from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
 
 
 @click.command()
@@ -53,7 +55,6 @@ def mission(
       boom mission table-2-4 table-3-1 --joint inner --joint lower --report judged.pdf
     """
     from planner.checks.rows import Verdict
-    from planner.files import check_writable
     from planner.missions.mission import check_cycle, load_mission, plan_cycle
     from planner.planning import torques
     from planner.reports.document import write_document
@@ -62,8 +63,7 @@ def mission(
 
     boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
     check_picture(picture)
-    check_report(document)
-    check_writable(picture, document)
+    files = outputs(picture, document=document, inputs=(*missions, boom_file, vehicle))
     if picture is not None and len(missions) > 1:
         raise InputError(f"--picture {picture}: a page shows one mission, and {len(missions)} are given")
     loaded = [load_mission(name) for name in missions]
@@ -78,17 +78,20 @@ def mission(
         name: (boom, cycle.trajectory, torques(boom, cycle.trajectory, payload_as, case), reports[name], cycle.moves)
         for name, cycle in (cycles.items() if picture or document else ())
     }
-    if document is not None:
-        text = next(iter(reports.values())).to_markdown() if alone else side_by_side_markdown(reports, joints)
-        pages = {name: drive_pages(*shown) for name, shown in drawn.items()}
-        titled = {
-            title if alone else f"{name}: {title}": page for name, page_of in pages.items() for title, page in page_of.items()
-        }
-        write_document(document, text, titled)
-        written["report"] = document
-    if picture is not None:
-        write_drive_picture(picture, *next(iter(drawn.values())))
-        written["picture"] = picture
+    with files:
+        if document is not None:
+            text = next(iter(reports.values())).to_markdown() if alone else side_by_side_markdown(reports, joints)
+            pages = {name: drive_pages(*shown) for name, shown in drawn.items()}
+            titled = {
+                title if alone else f"{name}: {title}": page
+                for name, page_of in pages.items()
+                for title, page in page_of.items()
+            }
+            write_document(files.temporary(document), text, titled)
+            written["report"] = document
+        if picture is not None:
+            write_drive_picture(files.temporary(picture), *next(iter(drawn.values())))
+            written["picture"] = picture
     if alone:
         return print_report(next(iter(reports.values())), written, as_json)
     if as_json:
@@ -98,13 +101,24 @@ def mission(
         for name, report in reports.items():
             print_lines(f"{name}", (report.summary,))
         print_files(written)
-    return ANSWER_IS_NO if any(report.verdict is Verdict.FAIL for report in reports.values()) else 0
+    failed = [f"{name}: {report.summary}" for name, report in reports.items() if report.verdict is Verdict.FAIL]
+    if failed:
+        complain("; ".join(failed))
+    return ANSWER_IS_NO if failed else 0
 
 
 @click.command()
 @click.argument("mission", default="field-day")
 @click.option("--joint", "joints", multiple=True, help="Size this joint; may be given again; else every one.")
-@click.option("--voltage", "voltages", type=float, multiple=True, metavar="V", help="Bus voltage to try; may be given again.")
+@click.option(
+    "--voltage",
+    "voltages",
+    type=float,
+    multiple=True,
+    callback=plausible(VOLTAGE),
+    metavar="V",
+    help="Bus voltage to try; may be given again.",
+)
 @click.option(
     "--adapt", type=click.Choice(["nothing", "rescale", "replan"]), default="nothing", show_default=True,
     help="What may change to suit a drive: the moves slowed evenly, or planned anew.",
@@ -139,7 +153,6 @@ def size(
       boom size field-day --variant inner=5.55 --variant payload=5 --report drives.html
     """
     from boom_model import JOINTS, Catalogue
-    from planner.files import check_writable
     from planner.missions.mission import check_steady, load_mission, plan_cycle
     from planner.reports.document import write_document
     from planner.reports.report import assumptions
@@ -148,8 +161,7 @@ def size(
     from planner.sizing.tables import SAVING, motors, no_motion, ranking, saving, sizing_json, sizing_markdown, sizing_notes
 
     boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
-    check_report(document)
-    check_writable(document)
+    files = outputs(document=document, inputs=(mission, boom_file, vehicle))
     catalogue = Catalogue.load().with_file(given_catalogue())
     booms = {"as it is": boom} | {text: parse_variant(boom, text) for text in variants}
     how, asked = Adapt(adapt), load_mission(mission)
@@ -169,7 +181,8 @@ def size(
     if document is not None:
         assumed = (*asked.assumptions, *assumptions(boom, asked.jerk_limited))
         text = sizing_markdown(f"Drives for the mission {asked.name}", choices, notes, assumed)
-        write_document(document, text, sizing_pictures(choices))
+        with files:
+            write_document(files.temporary(document), text, sizing_pictures(choices))
     if as_json:
         print_json(sizing_json(asked.name, choices, notes) | {"files": written})
     else:
@@ -184,4 +197,7 @@ def size(
         print_rows(SAVING, saving(choices))
         print_lines("Note", notes)
         print_files(written)
-    return ANSWER_IS_NO if any(choice.unmet for choice in choices) else 0
+    unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]
+    if unmet:
+        complain(f"no drive of the catalogue does the mission: {'; '.join(unmet)}")
+    return ANSWER_IS_NO if unmet else 0

@@ -7,8 +7,9 @@ from typing import Any
 import click
 
 from boom_model import Boom, InputError
-from planner.cli.options import boom_option, json_option, load_boom, payload_as_option, payload_option
-from planner.cli.printing import ANSWER_IS_NO, print_files, print_json, print_lines, print_rows
+from boom_model.plausible import TIME, WINDOW
+from planner.cli.options import boom_option, json_option, load_boom, outputs, payload_as_option, payload_option, plausible
+from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows
 
 
 @click.command()
@@ -33,9 +34,11 @@ def export(motion: str, out: str) -> int:
     from planner.motion.trajectory import trajectory_of
 
     form = form_of(out)
+    files = outputs(out, inputs=(motion,))
     data, notes = read_quantities(motion)
     trajectory = trajectory_of(motion, data, notes)
-    write_motion(trajectory, out, data.get("tau"))
+    with files:
+        write_motion(trajectory, files.temporary(out), data.get("tau"))
     print_lines("Note", trajectory.notes)
     click.echo(f"{form[1:]}: {out}")
     return 0
@@ -59,7 +62,9 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     """
     from planner.exports.robot_models import write_model
 
-    write_model(load_boom(boom_file, payload), out)
+    files, boom = outputs(out, inputs=(boom_file,)), load_boom(boom_file, payload)
+    with files:
+        write_model(boom, files.temporary(out))
     click.echo(f"model: {out}")
     return 0
 
@@ -71,7 +76,13 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     "--offset", default="0", show_default=True, metavar="S|best",
     help="Added to the log's times; best fits them to the plan, and so hides a delay of the drives.",
 )  # fmt: skip
-@click.option("--window", type=float, metavar="S", help="Width of the filter that differentiates the log; else 0.2 s.")
+@click.option(
+    "--window",
+    type=float,
+    callback=plausible(WINDOW),
+    metavar="S",
+    help="Width of the filter that differentiates the log; else 0.2 s.",
+)
 @click.option("--out", metavar="FILE.rrd", help="A recording of both, for `boom view`.")
 @payload_option
 @payload_as_option
@@ -97,29 +108,32 @@ def compare(
     Example:
       boom compare move.csv log.csv --offset best --out both.rrd
     """
-    from planner.experiments.comparison import WINDOW, read_log
+    from planner.experiments.comparison import WINDOW as USUAL_WINDOW
     from planner.experiments.comparison import compare as compare_motions
-    from planner.files import check_writable
+    from planner.experiments.comparison import read_log
     from planner.motion.motion_files import read_motion
 
     try:
         shift = None if offset == "best" else float(offset)
     except ValueError:
         raise InputError(f"offset {offset!r} is neither a number of seconds nor best") from None
-    check_writable(out)
+    if shift is not None:
+        TIME.require("offset", shift)
+    files = outputs(out, inputs=(planned, measured, boom_file))
     found = compare_motions(
         load_boom(boom_file, payload),
         read_motion(planned),
         read_log(measured),
         offset=shift,
-        window=WINDOW if window is None else window,
+        window=USUAL_WINDOW if window is None else window,
         payload_as=payload_as,
     )
     written = {}
     if out is not None:
         from planner.recording import write_comparison_recording
 
-        write_comparison_recording(out, found)
+        with files:
+            write_comparison_recording(files.temporary(out), found)
         written["recording"] = out
     answer = found.to_json(written)
     if as_json:
@@ -153,6 +167,8 @@ def validate(as_json: bool) -> int:
             cells.append((row.table, row.row, row.quantity, *numbers, "OK" if row.ok else "FAIL", row.note))
         print_rows(header, cells)
         click.echo(f"{len(rows) - failed} of {len(rows)} rows hold")
+    if failed:
+        complain(f"{failed} of {len(rows)} rows do not hold")
     return ANSWER_IS_NO if failed else 0
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from boom_model import InfeasibleError, InputError, inverse_kinematics
 from boom_model.kinematics.constraints import parse_constraint
-from planner.cli.options import boom_option, hold_option, json_option, load_boom, payload_option, pitch_option
+from planner.cli.options import boom_option, hold_option, json_option, load_boom, outputs, payload_option, pitch_option
 from planner.cli.printing import new_console, new_table, print_files, print_json
 from planner.paths.targets import parse_pitch, unreachable
 
@@ -79,6 +79,7 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
     boom, angle, held = load_boom(boom_file, payload), parse_pitch(pitch), parse_constraint(hold)
     if angle is None:
         raise InputError("pitch free: a reach map is drawn for one pitch")
+    files = outputs(out, inputs=(boom_file,))
     found = reach_map(boom, held, angle)
     row, column = np.nonzero(found.within_limits)
     answer: dict[str, Any] = {
@@ -105,16 +106,17 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
         "least_torque_margin": float(margin.min()) if known else None,
         "largest_torque_margin": float(margin.max()) if known else None,
     }
-    if out.endswith(".png"):
-        from planner.reports.reach_picture import reach_title, write_reach_picture
+    with files:
+        if out.endswith(".png"):
+            from planner.reports.reach_picture import reach_title, write_reach_picture
 
-        write_reach_picture(out, boom, found, reach_title(boom, found))
-        answer["files"] = {"picture": out}
-    else:
-        from planner.recording import write_reach_recording
+            write_reach_picture(files.temporary(out), boom, found, reach_title(boom, found))
+            answer["files"] = {"picture": out}
+        else:
+            from planner.recording import write_reach_recording
 
-        write_reach_recording(out, boom, found)
-        answer["files"] = {"recording": out}
+            write_reach_recording(files.temporary(out), boom, found)
+            answer["files"] = {"recording": out}
     if as_json:
         print_json(answer)
         return 0

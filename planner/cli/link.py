@@ -7,10 +7,10 @@ import click
 from boom_model import InfeasibleError, InputError
 from planner.cli.options import (
     boom_option,
-    check_report,
     given_catalogue,
     json_option,
     load_boom,
+    outputs,
     payload_as_option,
     payload_option,
     report_option,
@@ -112,21 +112,18 @@ def link(
       boom link --link lower --material aluminium --min-height 0.02 --dxf lower.dxf
     """
     from boom_model import Catalogue
-    from planner.files import check_writable
     from planner.links import files as link_files
     from planner.links import report as link_report
     from planner.links.design import LinkTask, default_moves, design_link
     from planner.motion.trajectory import read_csv
     from planner.planning import plan_each_profile
 
-    files = {"recording": out, "picture": picture, "contour": contour, "csv": csv_file, "dxf": dxf, "boom": out_boom}
-    files["report"] = document
+    named = {"recording": out, "picture": picture, "contour": contour, "csv": csv_file, "dxf": dxf, "boom": out_boom}
     if convergence and not as_json:
         raise InputError("--convergence is part of the JSON: give --json with it, or --picture")
     if picture is not None and not picture.endswith(".png"):
         raise InputError(f"{picture}: a picture is written as .png")
-    check_report(document)
-    check_writable(*files.values())
+    files = outputs(*named.values(), document=document, inputs=(boom_file, links, *motions))
     boom = load_boom(boom_file, payload)
     task = LinkTask(
         link=name,
@@ -159,29 +156,30 @@ def link(
         if as_json:
             print_json({"link": name, "load": load, "method": method, "mass_kg": None, "files": {}, "reason": str(error)})
         raise
-    written = {kind: file for kind, file in files.items() if file is not None}
-    if out is not None:
-        from planner.recording import write_link_recording
+    written = {kind: file for kind, file in (named | {"report": document}).items() if file is not None}
+    with files:
+        if out is not None:
+            from planner.recording import write_link_recording
 
-        write_link_recording(out, design)
-    if picture is not None:
-        from planner.links.picture import write_link_picture
+            write_link_recording(files.temporary(out), design)
+        if picture is not None:
+            from planner.links.picture import write_link_picture
 
-        write_link_picture(picture, design)
-    for file, write in (
-        (contour, link_files.write_contour),
-        (csv_file, link_files.write_stations),
-        (dxf, link_files.write_outline),
-    ):
-        if file is not None:
-            write(file, design)
-    if document is not None:
-        from planner.links.picture import link_pictures
-        from planner.reports.document import write_document
+            write_link_picture(files.temporary(picture), design)
+        for file, write in (
+            (contour, link_files.write_contour),
+            (csv_file, link_files.write_stations),
+            (dxf, link_files.write_outline),
+        ):
+            if file is not None:
+                write(files.temporary(file), design)
+        if document is not None:
+            from planner.links.picture import link_pictures
+            from planner.reports.document import write_document
 
-        write_document(document, link_report.to_markdown(design), link_pictures(design))
-    if out_boom is not None:
-        link_files.write_boom(out_boom, boom_file, design)
+            write_document(files.temporary(document), link_report.to_markdown(design), link_pictures(design))
+        if out_boom is not None:
+            link_files.write_boom(files.temporary(out_boom), boom_file, design)
     if as_json:
         answer = link_report.to_json(design, written)
         if convergence:

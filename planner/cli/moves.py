@@ -7,18 +7,20 @@ import click
 import numpy as np
 
 from boom_model import Boom, InfeasibleError, InputError
+from boom_model.plausible import DURATION, RATE
 from planner.cli.options import (
     boom_option,
     check_picture,
-    check_report,
     hold_option,
     json_option,
     load_boom,
     load_vehicle,
+    outputs,
     payload_as_option,
     payload_option,
     picture_option,
     pitch_option,
+    plausible,
     report_option,
     vehicle_option,
 )
@@ -27,6 +29,7 @@ from planner.paths.targets import parse_joint_velocity, parse_pitch
 
 if TYPE_CHECKING:
     from boom_model.arrays import Array
+    from planner.files import Outputs
     from planner.motion.trajectory import Trajectory
     from planner.reports.report import Report
 
@@ -48,10 +51,16 @@ if TYPE_CHECKING:
     "--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z",
     help="What goes straight: the joints, or the tip from tip target to tip target; or an arc of the tip through a point.",
 )  # fmt: skip
-@click.option("--duration", type=float, metavar="S", help="Else the least that the limits allow.")
+@click.option("--duration", type=float, callback=plausible(DURATION), metavar="S", help="Else the least that the limits allow.")
 @click.option("--jerk-bound", is_flag=True, help="Hold the time-optimal profile to the jerk limits as well.")
 @click.option("--average-torque", is_flag=True, help="Hold the time-optimal profile to the gearboxes' average torque as well.")
-@click.option("--rate", type=float, metavar="HZ", help="Sample at a controller's rate; the move ends on its clock.")
+@click.option(
+    "--rate",
+    type=float,
+    callback=plausible(RATE),
+    metavar="HZ",
+    help="Sample at a controller's rate; the move ends on its clock.",
+)
 @pitch_option
 @hold_option
 @payload_option
@@ -99,7 +108,6 @@ def plan(
       boom plan tip=1,1.7,0.9 tip=-1,1.7,0.9 --along line --profile jerk-limited
       boom plan transport phenotyping --via q=40,60,120,0.3,0 --pass-via --profile time-optimal --jerk-bound --rate 250
     """
-    from planner.files import check_writable
     from planner.motion.trajectory import write_csv
     from planner.move_spec import MoveSpec
     from planner.planning import plan_move
@@ -109,8 +117,7 @@ def plan(
     boom = load_boom(boom_file, payload)
     case = load_vehicle(vehicle)
     check_picture(picture)
-    check_report(document)
-    check_writable(out, csv_file, picture, document)
+    files = outputs(out, csv_file, picture, document=document, inputs=(boom_file, vehicle))
     elevation = parse_pitch(pitch)
     if show_reach and elevation is None:
         raise InputError("pitch free: the reach is drawn for one pitch")
@@ -151,16 +158,17 @@ def plan(
 
         reach = reach_map(boom, spec.constraint, elevation)
     written = {"recording": out}
-    write_recording(out, move, reach=reach)
-    if csv_file is not None:
-        write_csv(move.trajectory, csv_file, move.loads.tau)
-        written["csv"] = csv_file
-    if picture is not None:
-        from planner.reports.drive_pictures import write_drive_picture
+    with files:
+        write_recording(files.temporary(out), move, reach=reach)
+        if csv_file is not None:
+            write_csv(move.trajectory, files.temporary(csv_file), move.loads.tau)
+            written["csv"] = csv_file
+        if picture is not None:
+            from planner.reports.drive_pictures import write_drive_picture
 
-        write_drive_picture(picture, boom, move.trajectory, move.loads.tau, report)
-        written["picture"] = picture
-    _write_report(document, report, boom, move.trajectory, move.loads.tau, written)
+            write_drive_picture(files.temporary(picture), boom, move.trajectory, move.loads.tau, report)
+            written["picture"] = picture
+        _write_report(files, document, report, boom, move.trajectory, move.loads.tau, written)
     return print_report(report, written, as_json)
 
 
@@ -193,11 +201,10 @@ def profiles(
     Example:
       boom profiles transport phenotyping --payload 20 --out profiles.rrd
     """
-    from planner.files import check_writable
     from planner.move_spec import MoveSpec
     from planner.profile_table import HEADER, cells, profile_markdown, profile_moves, profile_rows
 
-    check_writable(out)
+    files = outputs(out, inputs=(boom_file,))
     spec = MoveSpec.of(start, goal, via=via, stop_at_via=not pass_via, pitch=pitch, constraint=hold)
     moves, refused = profile_moves(load_boom(boom_file, payload), spec, tracked("planning with each profile"))
     rows = profile_rows(moves)
@@ -205,7 +212,8 @@ def profiles(
     if out is not None:
         from planner.recording import write_moves_recording
 
-        write_moves_recording(out, moves, profile_markdown(rows))
+        with files:
+            write_moves_recording(files.temporary(out), moves, profile_markdown(rows))
         written["recording"] = out
     if as_json:
         print_json({"profiles": [asdict(row) for row in rows], "refused": refused, "files": written})
@@ -240,9 +248,11 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
     from planner.planning import torques
 
     form = form_of(out)
+    files = outputs(out, inputs=(motion, boom_file))
     boom, trajectory = load_boom(boom_file, payload), read_motion(motion)
     tau = torques(boom, trajectory, payload_as)
-    write_motion(trajectory, out, tau)
+    with files:
+        write_motion(trajectory, files.temporary(out), tau)
     at = np.abs(tau).argmax(axis=0)
     peaks = [
         {"joint": joint, "tau": float(tau[k, i]), "unit": LOAD_UNITS[i], "at_s": float(trajectory.t[k])}
@@ -288,32 +298,37 @@ def check(
       boom plan transport phenotyping --csv move.csv
       boom check move.csv --payload 8 --out checked.rrd
     """
-    from planner.files import check_writable
     from planner.motion.motion_files import read_motion
     from planner.planning import examine
 
-    check_report(document)
     check_picture(picture)
-    check_writable(out, document, picture)
+    files = outputs(out, picture, document=document, inputs=(motion, boom_file, vehicle))
     boom, trajectory = load_boom(boom_file, payload), read_motion(motion)
     move = examine(boom, trajectory, payload_as=payload_as, vehicle=load_vehicle(vehicle))
     written: dict[str, str] = {}
-    if out is not None:
-        from planner.recording import write_recording
+    with files:
+        if out is not None:
+            from planner.recording import write_recording
 
-        write_recording(out, move)
-        written["recording"] = out
-    _write_report(document, move.report, boom, trajectory, move.loads.tau, written)
-    if picture is not None:
-        from planner.reports.drive_pictures import write_drive_picture
+            write_recording(files.temporary(out), move)
+            written["recording"] = out
+        _write_report(files, document, move.report, boom, trajectory, move.loads.tau, written)
+        if picture is not None:
+            from planner.reports.drive_pictures import write_drive_picture
 
-        write_drive_picture(picture, boom, trajectory, move.loads.tau, move.report)
-        written["picture"] = picture
+            write_drive_picture(files.temporary(picture), boom, trajectory, move.loads.tau, move.report)
+            written["picture"] = picture
     return print_report(move.report, written, as_json)
 
 
 def _write_report(
-    document: str | None, report: "Report", boom: Boom, motion: "Trajectory", tau: "Array", written: dict[str, str]
+    files: "Outputs",
+    document: str | None,
+    report: "Report",
+    boom: Boom,
+    motion: "Trajectory",
+    tau: "Array",
+    written: dict[str, str],
 ) -> None:
     from planner.reports.document import write_document
     from planner.reports.drive_pictures import drive_pages
@@ -321,6 +336,8 @@ def _write_report(
 
     if document is not None:
         write_document(
-            document, report.to_markdown(), move_pictures(boom, motion, tau) | drive_pages(boom, motion, tau, report)
+            files.temporary(document),
+            report.to_markdown(),
+            move_pictures(boom, motion, tau) | drive_pages(boom, motion, tau, report),
         )
         written["report"] = document

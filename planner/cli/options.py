@@ -1,14 +1,16 @@
 """Options that several commands share, and what they stand for."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from boom_model import Boom, InputError
 from boom_model.kinematics.constraints import CONSTRAINTS
+from boom_model.plausible import Range
 
 if TYPE_CHECKING:
+    from planner.files import Outputs
     from planner.motion.vehicle import VehicleCase
 
 _CATALOGUE = "boom.catalogue"
@@ -26,6 +28,17 @@ _catalogue_option = click.option(
 def boom_option(command: Callable[..., Any]) -> Callable[..., Any]:
     """--boom, and --catalogue, which `load_boom` finds in the context: whoever names a drive may have brought it."""
     return _boom_option(_catalogue_option(command))
+
+
+def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any], Any]:
+    """Callback of an option whose number must be within the bounds of a quantity; None passes."""
+
+    def held(_: click.Context, parameter: click.Parameter, value: Any) -> Any:
+        if value is not None:
+            quantity.require(str(parameter.name).replace("_", "-"), value)
+        return value
+
+    return held
 
 
 payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; else the boom's own.")
@@ -84,9 +97,19 @@ def check_picture(picture: str | None) -> None:
         raise InputError(f"{picture}: the drives' page is written as .png")
 
 
-def check_report(document: str | None) -> None:
-    """Whether a report can have that name, before the work."""
-    from planner.reports.document import require_form
+def outputs(*files: str | None, document: str | None = None, inputs: Iterable[str | None] = ()) -> "Outputs":
+    """What the command writes, its report last, checked before the work; see `Outputs`.
 
+    Raises:
+        InputError: as `Outputs`, a report cannot have that name, or a file has the name of one of its pictures.
+    """
+    from planner.files import Outputs
+    from planner.reports.document import is_picture_of, require_form
+
+    read = [*inputs, given_catalogue()]
     if document is not None:
         require_form(document)
+        for other in (*files, *read):
+            if other is not None and is_picture_of(document, other):
+                raise InputError(f"{other}: the report {document} would write a picture there")
+    return Outputs(*files, document, inputs=read)

@@ -4,7 +4,7 @@ import io
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -91,8 +91,9 @@ def print_json(answer: dict[str, Any]) -> None:
 
 
 def complain(message: str) -> None:
-    """Prints one line on standard error."""
-    click.echo(f"boom: {' '.join(message.split())}", err=True)
+    """Prints one line on standard error, where that can be written."""
+    with suppress(OSError):
+        click.echo(f"boom: {' '.join(message.split())}", err=True)
 
 
 def tracked(title: str) -> Callable[[list[Any]], Iterable[Any]]:

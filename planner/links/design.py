@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from boom_model import JOINTS, Body, Boom, InputError, inverse_dynamics, transmission_angle
-from boom_model.arrays import Array, read_only
+from boom_model.arrays import Array, read_only, scalar
 from boom_model.drives.catalogue import Catalogue
 from boom_model.drives.drive import Drive
 from boom_model.dynamics.newton_euler import PayloadAs
@@ -35,6 +35,7 @@ from boom_model.link_design.beam import Forces
 from boom_model.link_design.exact import buckling_load, pressed
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
+from boom_model.plausible import DEFLECTION, HEIGHT, HEIGHT_STEP, SAFETY_FACTOR, TAPER, THICKNESS
 from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Verdict
 from planner.links.loads import largest_components, link_cases, thesis_load
@@ -61,6 +62,17 @@ class Method(StrEnum):
 
     THESIS = "thesis"
     EXACT = "exact"
+
+
+_PLAUSIBLE = {
+    "safety_factor": SAFETY_FACTOR,
+    "deflection": DEFLECTION,
+    "step": HEIGHT_STEP,
+    "min_height": HEIGHT,
+    "max_height": HEIGHT,
+    "max_taper": TAPER,
+    "thickness": THICKNESS,
+}
 
 
 @dataclass(frozen=True)
@@ -109,6 +121,10 @@ class LinkTask:
         for reason, asked in pointless.items():
             if asked:
                 raise InputError(reason)
+        for name, quantity in _PLAUSIBLE.items():
+            value = getattr(self, name)
+            if value is not None:
+                quantity.require(name.replace("_", " "), scalar(name.replace("_", " "), value))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from boom_model import Basis, Boom, InfeasibleError, InputError, Origin, Sourced
 from boom_model.arrays import Array, read_only
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import parse_constraint
-from boom_model.toml_file import Positive, Table, read_toml
+from boom_model.plausible import DURATION, LIFE, TIP_TOLERANCE
+from boom_model.toml_file import Table, read_toml
 from planner.checks.drives.duty import Duty, trapezoid_weights
 from planner.files import named_file
 from planner.motion.trajectory import STEP, Trajectory
@@ -36,6 +37,7 @@ _MOST_STEPS = 100_000
 _SAME_POSITION = 1e-6
 _DECIMALS = 9
 _DOWN, _HORIZONTAL = "down", "horizontal"
+_Duration = Annotated[float, DURATION]
 
 
 class _Step(Table):
@@ -47,11 +49,11 @@ class _Step(Table):
     profile: str = "cubic"
     jerk_bound: bool = False
     average_torque: bool = False
-    duration_s: Positive | None = None
+    duration_s: _Duration | None = None
     pitch: str = _DOWN
     hold: str = _HORIZONTAL
-    hold_s: Positive | None = None
-    pause_s: Positive | None = None
+    hold_s: _Duration | None = None
+    pause_s: _Duration | None = None
     repeat: Annotated[int, Field(gt=0)] | None = None
     steps: "list[_Step]" = Field(default_factory=list)
 
@@ -79,8 +81,8 @@ class _MissionTable(Table):
     start: str
     pitch: str = _DOWN
     hold: str = _HORIZONTAL
-    required_life_h: Positive | None = None
-    tip_tolerance_mm: Positive | None = None
+    required_life_h: Annotated[float, LIFE] | None = None
+    tip_tolerance_mm: Annotated[float, TIP_TOLERANCE] | None = None
     steps: Annotated[list[_Step], Field(min_length=1)]
 
 

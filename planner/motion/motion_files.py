@@ -16,6 +16,7 @@ from planner.motion.trajectory import (
     Trajectory,
     csv_table,
     motion_table,
+    opened,
     quantities,
     trajectory_of,
     write_csv,
@@ -99,8 +100,8 @@ def _write_parquet(trajectory: Trajectory, path: str | Path, tau: Array | None) 
     table = motion_table(trajectory, tau)
     fields = [field.with_metadata({"unit": UNITS[field.name]}) for field in table.schema]
     schema = pa.schema(fields, metadata={"joints": json.dumps(JOINTS), "notes": json.dumps(trajectory.notes)})
-    with replacing(path) as temporary:
-        parquet.write_table(table.cast(schema), temporary)
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        parquet.write_table(table.cast(schema), file)
 
 
 def _parquet_table(path: str | Path) -> "tuple[pa.Table, tuple[str, ...]]":
@@ -108,7 +109,7 @@ def _parquet_table(path: str | Path) -> "tuple[pa.Table, tuple[str, ...]]":
     from pyarrow import parquet
 
     try:
-        table = parquet.ParquetFile(path).read()
+        table = parquet.ParquetFile(opened(path)).read()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     except pa.ArrowException as error:
@@ -125,7 +126,7 @@ def _parquet_table(path: str | Path) -> "tuple[pa.Table, tuple[str, ...]]":
         raise InputError(f"{path}: a column is not of numbers: {error}") from None
     try:
         notes = json.loads((table.schema.metadata or {}).get(b"notes", b"[]"))
-    except ValueError:
+    except (ValueError, RecursionError):
         notes = []
     return table, tuple(str(note) for note in notes) if isinstance(notes, list) else ()
 

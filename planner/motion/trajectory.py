@@ -1,5 +1,7 @@
 """A sampled motion, and its CSV form."""
 
+import os
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, checked, read_only
 from boom_model.errors import InputError
+from boom_model.plausible import MOTION, TIME
 from planner.files import replacing
 from planner.timing.time_law import Motion
 
@@ -32,6 +35,8 @@ COLUMNS = ("t", *(f"{name}{i}" for name in _QUANTITIES for i in range(1, 6)))
 TORQUES = tuple(f"tau{i}" for i in range(1, 6))
 """Columns that follow where torques are written, in Nm and N."""
 
+_CLOSEST = 1e-9  # [s]
+_SHOWN = 20  # columns that a message names
 _FITTED = "velocities and accelerations are not in the file: taken from a cubic spline through its positions"
 
 
@@ -134,9 +139,10 @@ def write_csv(trajectory: Trajectory, path: str | Path, tau: Array | None = None
     """
     from pyarrow import csv
 
-    with replacing(path) as temporary:
-        options = csv.WriteOptions(quoting_style="none", quoting_header="none")
-        csv.write_csv(motion_table(trajectory, tau), temporary, options)
+    table = motion_table(trajectory, tau)
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        file.write(f"{','.join(table.column_names)}\n".encode())  # pyarrow would put each name in quotes
+        csv.write_csv(table, file, csv.WriteOptions(include_header=False))
 
 
 def motion_table(trajectory: Trajectory, tau: Array | None = None) -> "pa.Table":
@@ -174,11 +180,24 @@ def csv_table(path: str | Path) -> "pa.Table":
 
     numbers = dict.fromkeys((*COLUMNS, *TORQUES), pa.float64())
     try:
-        return csv.read_csv(str(path), convert_options=csv.ConvertOptions(column_types=numbers))
+        table = csv.read_csv(opened(path), convert_options=csv.ConvertOptions(column_types=numbers))
+        table.column_names  # noqa: B018, which decodes them
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except pa.ArrowInvalid as error:
+    except (pa.ArrowInvalid, UnicodeDecodeError) as error:
         raise InputError(f"{path}: not a motion's CSV: {error}") from None
+    return table
+
+
+def opened(path: str | Path) -> "pa.OSFile":
+    """A file for pyarrow, which takes no name with bytes that are not UTF-8.
+
+    Raises:
+        OSError: it cannot be opened.
+    """
+    import pyarrow as pa
+
+    return pa.OSFile(os.fsencode(path))
 
 
 def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, with_torques: bool = False) -> dict[str, Array]:
@@ -188,21 +207,24 @@ def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, wi
         first: what a message calls the first sample.
 
     Raises:
-        InputError: a column is missing, twice there or not known, or a value is not a finite number.
+        InputError: a column is missing, twice there or not known, or a value is not a finite number or not plausible; a
+            torque that is not asked for may be NaN.
     """
     names = set(table.column_names)
-    _complain(path, "has twice the column", {name for name in names if table.column_names.count(name) > 1})
+    _complain(path, "has twice the column", {name for name, count in Counter(table.column_names).items() if count > 1})
     looked_for = (*_QUANTITIES, "tau") if with_torques else _QUANTITIES
     found = [name for name in looked_for if name == "q" or any(f"{name}{i}" in names for i in range(1, 6))]
     needed = {"t", *(f"{name}{i}" for name in found for i in range(1, 6))}
     _complain(path, "lacks the column", needed - names)
     _complain(path, "has an unknown column", names - {*COLUMNS, *TORQUES})
     unit, start = first.split()
-    for name in needed:
+    for name in (name for name in (*COLUMNS, *TORQUES) if name in names):
         values = table[name].to_numpy()
-        if not np.isfinite(values).all():
-            row = int(np.argmin(np.isfinite(values)))
+        good = np.isfinite(values) if name in needed else ~np.isinf(values)
+        if not good.all():
+            row = int(np.argmin(good))
             raise InputError(f"{path}: {unit} {row + int(start)}, column {name}: {values[row]} is not a finite number")
+        (TIME if name == "t" else MOTION).require(f"{path}: column {name}", values[np.isfinite(values)])
     stacked = {name: np.stack([table[f"{name}{i}"].to_numpy() for i in range(1, 6)], axis=-1) for name in found}
     return {"t": table["t"].to_numpy()} | stacked
 
@@ -231,10 +253,14 @@ def _fitted(t: Array, q: Array, notes: tuple[str, ...]) -> Trajectory:
     plain = Trajectory.from_samples(t, q, still, still)
     if t.size < 4:
         raise InputError(f"{t.size} samples without velocities and accelerations; a spline needs at least 4")
+    if np.diff(plain.t).min() < _CLOSEST:
+        raise InputError(f"two samples are {np.diff(plain.t).min():g} s apart; a spline needs at least {_CLOSEST:g} s")
     spline = CubicSpline(plain.t, plain.q)
     return Trajectory.from_samples(t, q, spline(t, 1), spline(t, 2), notes=(*notes, _FITTED))
 
 
 def _complain(path: str | Path, what: str, names: set[str]) -> None:
     if names:
-        raise InputError(f"{path}: {what} {', '.join(sorted(names))}; a motion has {','.join(COLUMNS)} or its first six")
+        shown = sorted(names)[:_SHOWN]
+        more = f" and {len(names) - _SHOWN:,} more" if len(names) > _SHOWN else ""
+        raise InputError(f"{path}: {what} {', '.join(shown)}{more}; a motion has {','.join(COLUMNS)} or its first six")

@@ -12,10 +12,23 @@ from pydantic import Field
 from boom_model import Basis, InputError, Origin
 from boom_model.arrays import Array, checked
 from boom_model.dynamics.base_motion import BaseMotion, up_on_slope
-from boom_model.toml_file import Finite, NonNegative, Positive, Table, read_toml
+from boom_model.plausible import (
+    DIRECTION,
+    SHOCK,
+    SHOCK_DURATION,
+    SHOCK_EVENTS,
+    SHOCK_START,
+    SLOPE,
+    TRACK_AMPLITUDE,
+    VEHICLE_SPEED,
+    WAVELENGTH,
+)
+from boom_model.toml_file import Table, read_toml
 from planner.files import named_file
 
 _FOLDER = Path(str(files("planner.motion") / "vehicle_cases"))
+_SHORTEST = 1e-6
+_Direction = Annotated[list[Annotated[float, DIRECTION]], Field(min_length=3, max_length=3)]
 
 
 @dataclass(frozen=True)
@@ -137,22 +150,22 @@ def base_pose(case: VehicleCase, t: ArrayLike) -> Array:
 
 
 class _Slope(Table):
-    roll_deg: Finite = 0.0
-    pitch_deg: Finite = 0.0
+    roll_deg: Annotated[float, SLOPE] = 0.0
+    pitch_deg: Annotated[float, SLOPE] = 0.0
 
 
 class _Track(Table):
-    amplitude_m: NonNegative
-    wavelength_m: Positive
-    speed_m_s: Finite
+    amplitude_m: Annotated[float, TRACK_AMPLITUDE]
+    wavelength_m: Annotated[float, WAVELENGTH]
+    speed_m_s: Annotated[float, VEHICLE_SPEED]
 
 
 class _Shock(Table):
-    peak_m_s2: Finite
-    duration_s: Positive
-    start_s: Finite = 0.0
-    events: Positive | None = None
-    direction: Annotated[list[Finite], Field(min_length=3, max_length=3)] = Field(default_factory=lambda: [0.0, 0.0, 1.0])
+    peak_m_s2: Annotated[float, SHOCK]
+    duration_s: Annotated[float, SHOCK_DURATION]
+    start_s: Annotated[float, SHOCK_START] = 0.0
+    events: Annotated[float, SHOCK_EVENTS] | None = None
+    direction: _Direction = Field(default_factory=lambda: [0.0, 0.0, 1.0])
 
 
 class _CaseTable(Table):
@@ -180,8 +193,8 @@ def load_case(name: str) -> VehicleCase:
     track, shock = table.track, table.shock
     direction = np.array([0.0, 0.0, 1.0] if shock is None else shock.direction)
     length = float(np.linalg.norm(direction))
-    if length == 0.0:
-        raise InputError(f"{path}: key shock.direction: it is zero")
+    if length < _SHORTEST:
+        raise InputError(f"{path}: key shock.direction: its length is {length:g}; it must be at least {_SHORTEST:g}")
     x, y, z = (float(d) for d in direction / length)
     return VehicleCase(
         name=table.name,

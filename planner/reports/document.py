@@ -5,11 +5,12 @@ made it.
 """
 
 import io
+import os
+import re
 import shlex
 import sys
 from base64 import b64encode
 from collections.abc import Iterable, Mapping
-from contextlib import ExitStack
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -45,9 +46,25 @@ def require_form(path: str) -> None:
         raise InputError(f"{path}: a report is written as {', '.join(FORMS)}")
 
 
+def is_picture_of(document: str | Path, path: str | Path) -> bool:
+    """Whether a report in Markdown may write one of its pictures to `path`."""
+    report, other = Path(os.path.realpath(document)), Path(os.path.realpath(path))
+    name = re.fullmatch(rf"{re.escape(report.stem)}-[0-9]+\.png", other.name)
+    return report.suffix == ".md" and other.parent == report.parent and name is not None
+
+
 def command_line() -> str:
     """Return the running command as it would be typed."""
-    return shlex.join(["boom", *sys.argv[1:]])
+    return shlex.join(["boom", *sys.argv[1:]]).encode(errors="backslashreplace").decode()
+
+
+def without_pictures(markdown: str) -> str:
+    r"""Return Markdown whose own pictures and tags are plain text: a TOML source could have them loaded from anywhere.
+
+    >>> print(without_pictures("![x](http://a/b.png) <img src=c> 1 < 2"))
+    !\[x](http://a/b.png) \<img src=c> 1 < 2
+    """
+    return re.sub(r"<(?=[A-Za-z/!?])", r"\\<", markdown.replace("![", r"!\["))
 
 
 def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figure"]) -> None:
@@ -61,25 +78,22 @@ def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figu
             unchanged.
     """
     require_form(str(path))
-    path = Path(path)
+    path, markdown = Path(path), without_pictures(markdown)
     drawn = {title: _png(figure) for title, figure in pictures.items()}
     made = f"Made by `{command_line()}` with {', '.join(_versions())}, Python {sys.version.split()[0]}."
-    with ExitStack() as stack:  # all files are complete before the first is moved into place
-
-        def write(place: Path, data: bytes) -> None:
-            Path(stack.enter_context(replacing(place))).write_bytes(data)
-
+    with replacing(path) as temporary:
+        place = Path(temporary)
         if path.suffix == ".md":
             content = f"{markdown.rstrip()}\n"
             for k, (title, png) in enumerate(drawn.items(), start=1):
-                beside = path.with_name(f"{path.stem}-{k}.png")
-                write(beside, png)
+                beside = place.with_name(f"{path.stem}-{k}.png")  # moves along
+                beside.write_bytes(png)
                 content += f"\n## {title}\n\n![{title}]({beside.name})\n"
-            write(path, f"{content}\n---\n\n{made}\n".encode())
+            place.write_text(f"{content}\n---\n\n{made}\n", encoding="utf-8")
         elif path.suffix == ".html":
-            write(path, _html(path.stem, markdown, drawn, made).encode())
+            place.write_text(_html(path.stem, markdown, drawn, made), encoding="utf-8")
         else:
-            write(path, _pdf(markdown, drawn, made))
+            place.write_bytes(_pdf(markdown, drawn, made))
 
 
 def _versions() -> list[str]:

@@ -24,8 +24,10 @@ from toppra.constraint import (
 
 from boom_model import Boom
 from boom_model.arrays import Array
-from planner import JointLine, Motion, MoveSpec, TimeOptimal, plan, plan_motion
+from planner import MoveSpec, TimeOptimal, plan, plan_motion
+from planner.paths.path import JointLine
 from planner.timing.profiles.time_optimal import GRID_INTERVALS, time_optimal
+from planner.timing.time_law import Motion
 from tests.benchmarks.test_inverse_dynamics import fixed_root
 from tests.minimum_time import AT_STANDSTILL, DRIVEN, INERTIA, throughout, worst_ratios
 from tests.oracles import pinocchio_model, tree_matrix

@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 
 from boom_model import JOINTS, BaseMotion, Boom, Friction, up_on_slope
-from planner import JointLine, Motion, Profile, TimeOptimal, Verdict, certify, plan
+from planner import TimeOptimal, Verdict, plan
+from planner.checks.certificate import certify
+from planner.paths.path import JointLine
+from planner.timing.profile import Profile
+from planner.timing.time_law import Motion
 from planner.timing.timing import Timing, timed
 from tests.limits import DRIVEN, EFFICIENCY, INERTIA, START_STOP, held, motor_allows, times
 from tests.oracles import pinocchio_inverse_dynamics

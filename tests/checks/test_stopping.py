@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, InputError, forward_kinematics
-from planner import JointLine, Profile, plan, stop
-from planner.checks.stopping import MOMENTS, Way, worst_stop
-from planner.paths.path import through
+from planner import plan
+from planner.checks.stopping import MOMENTS, Way, stop, worst_stop
+from planner.paths.path import JointLine, through
+from planner.timing.profile import Profile
 from planner.timing.timing import Timing, timed
 from tests.limits import worst
 

@@ -193,7 +193,7 @@ def test_the_command_fails_where_the_boom_does(boom, tmp_path):
         (("--controller", "pdd"), "controller is 'pdd'; there are: pd, pid, computed-torque, lqr, stepper, or all"),
         (("--profile", "cubic,slow"), "profile is 'slow'"),
         (("--set", "rate=5"), "unknown figure 'rate'"),
-        (("--bandwidth", "-1"), "bandwidth_Hz is -1; it must be above 0"),
+        (("--bandwidth", "-1"), "bandwidth is -1 Hz; it must be between 0.001 and 100000 Hz"),
         (("--gust", "1,2"), "is not FX,FY,FZ,START,DURATION"),
         (("--settle-mm", "nan"), "settle-mm is nan"),
         (("--payload-error", "-20"), "payload is -10"),

@@ -25,9 +25,9 @@ from boom_model import (
     jacobian,
 )
 from boom_model.arrays import Array
-from planner import Trajectory, plan, write_csv
+from planner import Trajectory, plan
 from planner.experiments.comparison import Log, Smoothed, compare, read_log, smoothed
-from planner.motion.trajectory import read_csv
+from planner.motion.trajectory import read_csv, write_csv
 from planner.recording import write_comparison_recording
 
 BOOM = Boom.load()

@@ -11,9 +11,9 @@ import yaml
 from pyarrow import parquet
 
 from boom_model import JOINTS, Boom, InputError
-from planner import Trajectory, plan, read_csv, write_csv
+from planner import Trajectory, plan
 from planner.motion.motion_files import UNITS, read_motion, read_quantities, write_joint_trajectory, write_motion
-from planner.motion.trajectory import COLUMNS, TORQUES
+from planner.motion.trajectory import COLUMNS, TORQUES, read_csv, write_csv
 
 MOVE = plan(Boom.load(), "transport", "phenotyping", profile="jerk-limited")
 PARTS = {"positions": "q", "velocities": "qd", "accelerations": "qdd"}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, InputError
-from planner import Trajectory, plan, read_csv, sample, write_csv
-from planner.motion.trajectory import COLUMNS
+from planner import Trajectory, plan
+from planner.motion.trajectory import COLUMNS, read_csv, sample, write_csv
 
 MOVE = plan(Boom.load(), "transport", "phenotyping", profile="jerk-limited")
 

@@ -9,9 +9,9 @@ import pytest
 from boom_model import Basis, Boom, InfeasibleError, InputError, Origin
 from boom_model.boom_file import BOOM_FILE
 from boom_model.keep_out import Box, Capsule, KeepOut
-from planner import Cubic, JointLine, TipTarget, plan
+from planner import Cubic, TipTarget, plan
 from planner.paths.clearance import LINKS, clearance, least_clearance
-from planner.paths.path import through
+from planner.paths.path import JointLine, through
 from planner.paths.routing import detour
 
 BOOM = Boom.load()

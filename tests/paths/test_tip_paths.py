@@ -22,10 +22,12 @@ from boom_model.kinematics.constraints import (
 )
 from boom_model.kinematics.forward import forward_kinematics
 from boom_model.kinematics.inverse import inverse_kinematics
-from planner import Profile, TipTarget, plan, sample
+from planner import TipTarget, plan
+from planner.motion.trajectory import sample
 from planner.paths.tip_curves import TipArc, TipLine
 from planner.paths.tip_path import TipPath, follow
 from planner.timing.path_limits import motor_limits, path_dynamics, rotors
+from planner.timing.profile import Profile
 
 BOOM = Boom.load()
 LIMITS = BOOM.limits

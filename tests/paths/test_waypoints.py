@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, InfeasibleError, InputError
-from planner import Cubic, JointLine, Profile, TipTarget, plan
-from planner.paths.path import SplinePath, spaced, through
-from planner.timing.profile import parse_profile
+from planner import Cubic, TipTarget, plan
+from planner.paths.path import JointLine, SplinePath, spaced, through
+from planner.timing.profile import Profile, parse_profile
 from planner.timing.timing import Timing, timed
 from tests.limits import ratios, worst
 

@@ -12,7 +12,8 @@ import pypdf
 import pytest
 
 from boom_model import Boom, InputError
-from planner import plan, write_csv
+from planner import plan
+from planner.motion.trajectory import write_csv
 from planner.reports.document import write_document
 from planner.reports.drive_pictures import drive_pages
 from planner.reports.move_pictures import move_pictures
@@ -211,7 +212,7 @@ def test_a_folder_that_takes_no_file_keeps_what_it_had(planned, tmp_path, monkey
         raise PermissionError(13, "Permission denied")
 
     (tmp_path / name).write_text("old")
-    monkeypatch.setattr("tempfile.mkstemp", refuse)  # a folder's mode stops no superuser
+    monkeypatch.setattr("tempfile.mkdtemp", refuse)  # a folder's mode stops no superuser
     with pytest.raises(InputError, match="cannot be written: Permission denied"):
         write_document(tmp_path / name, "# New\n", planned[1])
     assert os.listdir(tmp_path) == [name]

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, inverse_dynamics
-from planner import InfeasiblePathError, JointLine, TimeOptimal, plan
+from planner import TimeOptimal, plan
+from planner.paths.path import JointLine
+from planner.timing.path_limits import InfeasiblePathError
 from planner.timing.timing import Timing, timed
 from tests.limits import times, worst
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from boom_model import Boom, InfeasibleError
-from planner import JointLine, Profile
+from planner.paths.path import JointLine
+from planner.timing.profile import Profile
 from planner.timing.timing import Timing, timed
 from tests.limits import held, random_pairs, worst
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from planner import JointLine, Motion, TimeLaw
+from planner.paths.path import JointLine
+from planner.timing.time_law import Motion, TimeLaw
 
 START, GOAL = np.array([0.0, 0.1, 1.0, 0.2, -0.3]), np.array([1.0, 0.6, 2.5, 0.9, 0.4])
 

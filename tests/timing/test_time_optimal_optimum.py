@@ -10,7 +10,8 @@ import pytest
 from boom_model import Boom
 from boom_model.arrays import Array
 from boom_model.boom import Friction
-from planner import JointLine, Move, TipTarget, plan
+from planner import Move, TipTarget, plan
+from planner.paths.path import JointLine
 from tests.minimum_time import DRIVEN, INTERVALS, minimum_time, throughout, worst_ratios
 
 BOOM = Boom.load()

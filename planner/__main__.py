@@ -1,0 +1,50 @@
+"""The process of the command `boom`, or `python -m planner`: what holds from its first moment to its last.
+
+This module imports nothing that takes time, so that a signal during the imports finds its handler.
+"""
+
+import os
+import signal
+import sys
+import warnings
+from types import FrameType
+from typing import NoReturn
+
+_STOPPED = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+
+
+def main() -> NoReturn:
+    """Run the command; exit 130 or 143 with one line when it is interrupted or terminated, else as `planner.cli.main`."""
+    for number in _STOPPED:
+        signal.signal(number, _stop)
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever the user's windows are drawn with
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file's name may hold any byte
+    # NumPy only warns of numbers beyond what it can compute, and goes on with an infinity.
+    warnings.filterwarnings("error", "(overflow|invalid value|divide by zero) encountered", RuntimeWarning)
+    from planner.cli import main as run
+
+    try:
+        run()
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    sys.exit()
+
+
+def _stop(number: int, _: FrameType | None) -> NoReturn:
+    """Ends the process at once.
+
+    An exception would have to pass through libraries that swallow it, or turn it into an error of theirs.
+    """
+    discard = getattr(sys.modules.get("planner.files"), "discard", None)
+    if discard is not None:
+        discard()
+    try:
+        os.write(2, f"boom: {_STOPPED[signal.Signals(number)]}\n".encode())
+    finally:
+        os._exit(128 + number)
+
+
+if __name__ == "__main__":
+    main()

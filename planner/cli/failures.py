@@ -1,0 +1,63 @@
+"""What an exception that ends the command means: one line on standard error, and an exit code."""
+
+import errno
+import os
+import sys
+import traceback
+from contextlib import suppress
+
+import click
+
+from boom_model.errors import BoomError, InfeasibleError
+from planner.cli.printing import ANSWER_IS_NO, BAD_INPUT, complain
+
+INTERNAL_ERROR, INTERRUPTED = 70, 130
+DEBUG = "BOOM_DEBUG"
+"""Environment variable that asks for the traceback of an internal error."""
+
+
+def failure(error: BaseException) -> int:
+    """Prints one line about the exception; returns the exit code that it stands for."""
+    code, message = _meaning(error)
+    if code == INTERNAL_ERROR and os.environ.get(DEBUG):
+        traceback.print_exception(error)
+    complain(message)
+    return code
+
+
+def _meaning(error: BaseException) -> tuple[int, str]:
+    if isinstance(error, InfeasibleError):
+        return ANSWER_IS_NO, str(error)
+    if isinstance(error, BoomError):
+        return BAD_INPUT, str(error)
+    if isinstance(error, click.ClickException):
+        return BAD_INPUT, error.format_message()
+    if isinstance(error, click.Abort | KeyboardInterrupt):
+        return INTERRUPTED, "interrupted"
+    if isinstance(error, MemoryError | OverflowError | RecursionError | FloatingPointError | RuntimeWarning):
+        return BAD_INPUT, f"the numbers given are beyond what can be computed: {error or type(error).__name__}"
+    if isinstance(error, OSError):
+        return BAD_INPUT, _refused(error)
+    return INTERNAL_ERROR, (
+        f"internal error: {type(error).__name__}: {error}; please report it with the command, and with what it prints under "
+        f"{DEBUG}=1"
+    )
+
+
+def _refused(error: OSError) -> str:
+    """What the operating system refused; files of the user's own have named themselves before."""
+    reason = error.strerror or str(error)
+    if error.filename is not None:
+        return f"{os.fsdecode(error.filename)}: {reason}"
+    if error.errno == errno.ENOENT:
+        return "the working directory does not exist any more"
+    _abandon_output()
+    return f"standard output cannot be written: {reason}"
+
+
+def _abandon_output() -> None:
+    """Sends what is still to be written nowhere, so that Python does not try again when it ends."""
+    with suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.__stdout__.fileno())  # type: ignore[union-attr]
+        os.close(nowhere)
