@@ -17,6 +17,7 @@ from planner.checks.drives.tip import tip_rows
 from planner.checks.rows import Row, Verdict, held, overall
 from planner.motion.trajectory import Trajectory
 from planner.paths.clearance import nearest_approach
+from planner.timing.travel_mean import average_torque
 
 __all__ = ["ANGLE_CHECKS", "Row", "Shock", "Verdict", "average_torque", "check_rows", "drive_rows", "joint_views", "overall"]
 
@@ -219,11 +220,3 @@ def _mount_rows(boom: Boom, t: Array, loads: Loads) -> Iterator[Row]:
         origin = Origin(Basis.PRINTED, "no limit of the vehicle's mount is given") if bearable is None else bearable.origin
         limit = None if bearable is None else bearable.value
         yield held("mount", f"peak {name}", float(size[at]), limit, unit, float(t[at]), origin)
-
-
-def average_torque(t: Array, tau: Array, qd: Array) -> float | None:
-    """Cube mean of the torque weighted by speed, (int |qd| |tau|^3 dt / int |qd| dt)^(1/3) [Nm]; None for a joint that rests.
-
-    Harmonic Drive's average torque. Its weight loses what is only held: see the hold row.
-    """
-    return Duty.alone(t).travel_mean(tau, qd)

@@ -19,7 +19,7 @@ from boom_model import BaseMotion, Basis, Boom, InfeasibleError, InputError, Ori
 from boom_model.arrays import Array, read_only
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.toml_file import Positive, Table, read_toml
-from planner.checks.drives.duty import Duty, trapezoid_weights
+from planner.checks.drives.duty import Duty
 from planner.files import named_file
 from planner.motion.trajectory import STEP, Trajectory, joined, sample
 from planner.motion.vehicle import VehicleCase
@@ -29,6 +29,7 @@ from planner.planning import CHECKS_PER_STEP, check
 from planner.progress import Track
 from planner.reports.report import Report
 from planner.timing.timing import Profile, Timing, timed
+from planner.timing.travel_mean import trapezoid_weights
 
 _FOLDER = Path(str(files("planner.missions") / "named_missions"))
 _MOST_STEPS = 100_000

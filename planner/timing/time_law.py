@@ -136,7 +136,7 @@ class Motion:
         """
         inside = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         s, v, a, j = (np.asarray(self.law.s(inside, order)) for order in range(4))
-        s = np.clip(s, 0.0, 1.0)
+        s, v = np.clip(s, 0.0, 1.0), np.maximum(v, 0.0)  # no law goes back, rounding apart: friction has a direction
         p = [self.path(s, order) for order in range(4)]
         v, a, j = v[..., None], a[..., None], j[..., None]
         return p[0], p[1] * v, p[2] * v**2 + p[1] * a, p[3] * v**3 + 3.0 * p[2] * v * a + p[1] * j

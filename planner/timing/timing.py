@@ -8,11 +8,11 @@ import numpy as np
 
 from boom_model import JOINTS, BaseMotion, Boom, InfeasibleError, InputError
 from boom_model.arrays import Array, scalar
-from planner.checks.certificate import WorstRatio, certify
 from planner.paths.clearance import require_path_clear
-from planner.paths.path import JointLine, Path, SplinePath
-from planner.timing.path_limits import jerk_stretch, least_stretch, looks, shares
+from planner.paths.path import Path, SplinePath
+from planner.timing.path_limits import least_stretch, looks, shares
 from planner.timing.time_law import Motion, TimeLaw
+from planner.timing.worst_ratios import WorstRatio, joint_stretch, worst_ratios
 
 _ROUNDING = 1e-9
 
@@ -106,13 +106,8 @@ def _least(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> M
         require_path_clear(boom, motion.path)  # another path than the one that was looked at
     else:
         motion = Motion(path, _law(boom, path, timing, base))
-    if isinstance(path, JointLine) and timing.profile is not Profile.TIME_OPTIMAL:
-        return motion
-    samples = looks(motion.path)
-    missed = least_stretch(boom, motion.path, motion.law, base, samples)
-    if motion.law.jerk_limited:
-        missed = max(missed, jerk_stretch(boom, motion.path, motion.law, samples))
-    return _slowed(motion, max(1.0, missed))
+    motion = _slowed(motion, max(1.0, least_stretch(boom, motion.path, motion.law, base, looks(motion.path))))
+    return _slowed(motion, max(1.0, joint_stretch(boom, motion)))
 
 
 def _law(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> TimeLaw:
@@ -136,7 +131,8 @@ def _law(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> Tim
             return jerk_limited(boom, path, base)
         case Profile.TIME_OPTIMAL:
             from planner.timing.profiles.average_torque import within_average_torque
-            from planner.timing.profiles.time_optimal import time_optimal, with_jerk_bound
+            from planner.timing.profiles.jerk_bound import with_jerk_bound
+            from planner.timing.profiles.time_optimal import time_optimal
 
             law = within_average_torque(boom, path, base) if timing.average_torque else time_optimal(boom, path, base)
             if not timing.jerk_bound:
@@ -174,7 +170,7 @@ def _too_short(
 ) -> str:
     """How far a duration is from the least, and which limit it would break most."""
     hasty = [_slowed(motion, asked / least) for motion in motions]
-    worst = max(certify(boom, hasty, base, timing.average_torque).worst, key=lambda each: each.ratio)
+    worst = max(worst_ratios(boom, hasty, base, timing.average_torque)[0], key=lambda each: each.ratio)
     when = "" if worst.at_s is None else f" at {worst.at_s:.2f} s"
     parts = f" ({_parts(boom, hasty, worst, base)})" if worst.limit in _INSTANT else ""
     return (

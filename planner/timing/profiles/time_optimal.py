@@ -20,8 +20,6 @@ from planner.timing.path_limits import (
     PathDynamics,
     explain_infeasible,
     gear_limits,
-    jerk_stretch,
-    least_stretch,
     motor_limits,
     path_dynamics,
     rotors,
@@ -37,9 +35,6 @@ _MET = 1e-3
 _FINITE = 1e12
 _ROUNDING = 1e-8
 _TRIES = 10
-_NARROWEST = -2.5  # of the windows to average over: the power of ten, as a share of the duration
-_WINDOWS = 11
-_WINDOW_TOLERANCE = 1e-3
 
 _Rows = tuple[Array, Array, Array]
 
@@ -136,27 +131,6 @@ def _breakable(rows: _Rows, demands: PathDynamics) -> _Rows:
     return a[:, kept], b[:, kept], c[:, kept]
 
 
-def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None) -> TimeLaw:
-    """A law averaged over a window and slowed until it keeps the joints' jerk limits besides their others.
-
-    Averaging s(t) neither leaves the path nor starts or ends in motion, makes the acceleration continuous and 0 at both ends,
-    and bounds the jerk by the jump of the acceleration over the window. What it shifts past a limit an even slowing mends; the
-    window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
-    makes the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is not the optimum.
-    """
-    from scipy.optimize import minimize_scalar
-
-    def smooth(exponent: float) -> TimeLaw:
-        smoothed = law.averaged(law.duration * 10.0**exponent)
-        return smoothed.stretched(max(1.0, jerk_stretch(boom, path, smoothed), least_stretch(boom, path, smoothed, base)))
-
-    exponents = np.linspace(_NARROWEST, 0.0, _WINDOWS)
-    least = int(np.argmin([smooth(exponent).duration for exponent in exponents]))
-    around = exponents[max(least - 1, 0)], exponents[min(least + 1, _WINDOWS - 1)]
-    found = minimize_scalar(lambda x: smooth(x).duration, bounds=around, method="bounded", options={"xatol": _WINDOW_TOLERANCE})
-    return min(smooth(float(found.x)), smooth(float(exponents[least])), key=lambda each: each.duration)
-
-
 def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
     """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,)."""
     boom, zero = demands.boom, np.zeros_like(demands.s)
@@ -194,22 +168,22 @@ def _solve(condition: "_Condition", path: Path, s: Array) -> Array | None:
     also asks for the least such x; here it is 0, because the load can be held at rest everywhere.
     """
     solver = seidelWrapper([condition], _ToppraPath(path), s)
-    step, top, x = solver.get_deltas(), np.zeros_like(s), np.zeros_like(s)
-    highest = np.array([1e-9, -1.0])
-    for i in range(len(step) - 1, -1, -1):
-        top[i] = solver.solve_stagewise_optim(i, None, highest, np.nan, np.nan, 0.0, top[i + 1])[1]
+    steps, top, x = solver.get_deltas(), [0.0] * len(s), [0.0] * len(s)
+    highest, onwards = np.array([1e-9, -1.0]), np.stack([-2.0 * steps, np.full(len(steps), -1.0)], axis=1)
+    free = math.nan
+    for i in range(len(steps) - 1, -1, -1):
+        top[i] = solver.solve_stagewise_optim(i, None, highest, free, free, 0.0, top[i + 1])[1]
         if math.isnan(top[i]):
             return None
-    for i in range(len(step)):
-        onwards = np.array([-2.0 * step[i], -1.0])
+    for i, step in enumerate(steps.tolist()):
         for _ in range(_TRIES):  # rounding may put x a little above what can be reached from
-            u = solver.solve_stagewise_optim(i, None, onwards, x[i], x[i], 0.0, top[i + 1])[0]
+            u = float(solver.solve_stagewise_optim(i, None, onwards[i], x[i], x[i], 0.0, top[i + 1])[0])
             if not math.isnan(u):
                 break
             x[i] *= 1.0 - 1e-3
         else:
             return None
-        reached = x[i] + 2.0 * step[i] * u
+        reached = x[i] + 2.0 * step * u
         x[i + 1] = min(top[i + 1], max(reached - _ROUNDING, reached * (1.0 - 1e-4), 0.0))
     return np.sqrt(x)
 
