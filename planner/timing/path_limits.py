@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 _ROOT = 1e-12  # relative accuracy of a root
 _FINITE = 1e12
 _LEAST_SHARE = 1e-6
-_SLOPES = 20_001
+_SLOPES = 20_000
+_BETWEEN = 20
+_ROUNDING = 1e-9
 _LOAD_INTERVALS = 500
 _LOOKS, _CURVED_LOOKS = 2001, 10_001
 
@@ -196,7 +198,7 @@ class PathLoads:
         """The loads of a path on a base that is tilted at most."""
         from scipy.interpolate import CubicSpline
 
-        s = np.linspace(0.0, 1.0, _LOAD_INTERVALS + 1)
+        s = spread(path, _LOAD_INTERVALS)
         demands = path_dynamics(boom, path, s, base)
         return PathLoads(boom, path, CubicSpline(s, np.stack([demands.a, demands.b, demands.c], axis=1)))
 
@@ -284,13 +286,19 @@ def looks(path: Path) -> int:
     return _LOOKS if isinstance(path, JointLine) else _CURVED_LOOKS
 
 
+def spread(path: Path, intervals: int) -> Array:
+    """Places s from 0 to 1 in so many steps, and in at least `_BETWEEN` between two knots of the path, which are among them."""
+    edges = np.concatenate([[0.0], path.knots, [1.0]])
+    steps = np.maximum(np.ceil(np.diff(edges) * intervals - _ROUNDING), _BETWEEN if len(path.knots) else 1).astype(int)
+    return np.unique(np.concatenate([np.linspace(a, b, n + 1) for a, b, n in zip(edges[:-1], edges[1:], steps, strict=True)]))
+
+
 def path_limits(boom: Boom, path: Path) -> tuple[float, float, float]:
     """The least of limit / |p'| over joints and path, for velocity, acceleration and jerk.
 
     On a straight path they bound the first, second and third time derivative of s.
     """
-    points = np.linspace(0.0, 1.0, 1 if isinstance(path, JointLine) else _SLOPES)
-    step = np.abs(path(points, 1)).max(axis=0)
+    step = np.abs(path(spread(path, 1 if isinstance(path, JointLine) else _SLOPES), 1)).max(axis=0)
     limits = boom.limits
     with np.errstate(divide="ignore"):
         velocity, acceleration, jerk = (

@@ -15,6 +15,8 @@ from planner.timing.time_law import Motion, TimeLaw
 from planner.timing.worst_ratios import WorstRatio, joint_stretch, worst_ratios
 
 _ROUNDING = 1e-9
+_MISSED = 1e-5  # relative; what is missed by less is left as it is
+_TRIES = 5  # the derivatives of a very short line of the tip are rounding in part, and come out otherwise each time
 
 
 class Profile(StrEnum):
@@ -107,7 +109,12 @@ def _least(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> M
     else:
         motion = Motion(path, _law(boom, path, timing, base))
     motion = _slowed(motion, max(1.0, least_stretch(boom, motion.path, motion.law, base, looks(motion.path))))
-    return _slowed(motion, max(1.0, joint_stretch(boom, motion)))
+    for _ in range(_TRIES):
+        missed = joint_stretch(boom, motion)
+        if missed <= 1.0 + _MISSED:
+            break
+        motion = _slowed(motion, missed)
+    return motion
 
 
 def _law(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> TimeLaw:

@@ -23,6 +23,7 @@ from planner.timing.path_limits import (
     motor_limits,
     path_dynamics,
     rotors,
+    spread,
     static_limits,
 )
 from planner.timing.time_law import TimeLaw
@@ -42,7 +43,7 @@ _Rows = tuple[Array, Array, Array]
 def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, intervals: int = GRID_INTERVALS) -> TimeLaw:
     """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
 
-    The path acceleration is constant over each of the `intervals` equal steps in s, and the conditions hold at both ends of
+    The path acceleration is constant over each of the `intervals` steps in s (more where knots of the path are near), and the conditions hold at both ends of
     each step (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step.
 
     A drive's limit falls with its speed and viscous friction grows with it; toppra holds only what is linear in u and x. Both
@@ -54,12 +55,12 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
         InfeasiblePathError: no law keeps the limits, or a drive could not stop and hold its load somewhere;
             names the joint, the place, the demand and the limit.
     """
-    s = np.linspace(0.0, 1.0, intervals + 1)
+    s = spread(path, intervals)
     demands = path_dynamics(boom, path, s, base)
     if (demands.static_ratio > 1.0).any():  # a swing might carry the load past such a place, but could not stop at it
         raise explain_infeasible(demands)
     unit = _time_scale(demands)
-    few = np.unique(np.linspace(0, intervals, min(intervals, _ROUGH_INTERVALS) + 1).astype(int))
+    few = np.unique(np.linspace(0, len(s) - 1, min(intervals, _ROUGH_INTERVALS) + 1).astype(int))
     rough, found = _iterate(demands.at(few), path, np.zeros(len(few)), unit), None
     if rough is not None:
         unit = float(_durations(s[few], rough.speed).sum())
