@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from boom_model import JOINTS, Basis, Drive, LinearDrive, Origin, transmission_angle
-from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from planner.checks.drives.actuator import actuator_rows
 from planner.checks.drives.duty import Duty
@@ -179,11 +178,3 @@ def _mount_rows(evaluation: Evaluation) -> Iterator[Row]:
             at=float(evaluation.t[at]),
             origin=Origin(Basis.PRINTED, "no limit of the vehicle's mount is given") if bearable is None else bearable.origin,
         )
-
-
-def average_torque(t: Array, tau: Array, qd: Array) -> float | None:
-    """Cube mean of the torque weighted by speed, (int |qd| |tau|^3 dt / int |qd| dt)^(1/3) [Nm]; None for a joint that rests.
-
-    Harmonic Drive's average torque. Its weight loses what is only held: see the hold row.
-    """
-    return Duty.alone(t).travel_mean(tau, qd)

@@ -21,7 +21,7 @@ from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import parse_constraint
 from boom_model.plausible import DURATION, LIFE, TIP_TOLERANCE
 from boom_model.toml_file import Table, read_toml
-from planner.checks.drives.duty import Duty, trapezoid_weights
+from planner.checks.drives.duty import Duty
 from planner.files import named_file
 from planner.motion.trajectory import STEP, Trajectory
 from planner.motion.vehicle import LEVEL, VehicleCase
@@ -31,6 +31,7 @@ from planner.planning import check, plan_motion
 from planner.progress import Track
 from planner.reports.report import Report
 from planner.timing.profile import JerkLimited, parse_profile
+from planner.timing.travel_mean import trapezoid_weights
 
 _FOLDER = Path(str(files("planner.missions") / "named_missions"))
 _MOST_STEPS = 100_000

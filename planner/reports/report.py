@@ -8,11 +8,12 @@ import numpy as np
 from boom_model import JOINTS, Basis, Boom, Breakdown
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, LOAD_UNITS
-from planner.checks.certificate import Certificate, WorstRatio
+from planner.checks.certificate import Certificate
 from planner.checks.kinds import Margin
 from planner.checks.rows import Row, Verdict, overall
 from planner.checks.stopping import WorstStop
 from planner.reports.markdown import section, table
+from planner.timing.worst_ratios import WorstRatio
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -9,6 +9,7 @@ its speed, that is with x.
 """
 
 from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,10 +22,16 @@ from boom_model.dynamics.base_motion import BaseMotion
 from planner.paths.path import JointLine, Path
 from planner.timing.time_law import Motion, TimeLaw
 
-_LEAST_STRETCH_STEPS = 60
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
+_ROOT = 1e-12  # relative accuracy of a root
 _FINITE = 1e12
 _LEAST_SHARE = 1e-6
-_SLOPES = 20_001
+_SLOPES = 20_000
+_BETWEEN = 20
+_ROUNDING = 1e-9
+_LOAD_INTERVALS = 500
 _LOOKS, _CURVED_LOOKS = 2001, 10_001
 
 
@@ -81,17 +88,6 @@ class PathDynamics:
         half = self.viscous / 2.0
         return self.coulomb + half * root, half / root
 
-    def torque_ratio(self, u: Array, x: Array) -> Array:
-        """(n, 5) the larger of gearbox and motor torque over their limits, at u and x (n,); 0 where no drive limits.
-
-        With friction and without: it earns no credit while braking.
-        """
-        u, x = u[:, None], x[:, None]
-        smooth = self.a * u + self.b * x + self.c
-        qd, qdd = self.p1 * np.sqrt(x), self.p1 * u + self.p2 * x
-        rubbed = smooth + self.coulomb + self.viscous * np.sqrt(x)
-        return np.maximum(load_ratio(self.boom, smooth, qd, qdd), load_ratio(self.boom, rubbed, qd, qdd))
-
     @property
     def static_ratio(self) -> Array:
         """(n, 5) of merely holding the load, over what motor and gearbox allow at rest."""
@@ -139,6 +135,11 @@ def motor_limits(boom: Boom, speed: ArrayLike) -> Array:
     return limits
 
 
+def limited_by_drives(boom: Boom) -> bool:
+    """Whether any gearbox or motor limits a torque."""
+    return bool(np.isfinite(static_limits(boom)).any())
+
+
 def static_limits(boom: Boom) -> Array:
     """(5,) torque that motor and gearbox allow at rest [Nm]; infinite where no drive limits."""
     return np.minimum(gear_limits(boom), motor_limits(boom, np.zeros(5)))
@@ -163,36 +164,121 @@ def _largest_x(boom: Boom, p1: Array) -> Array:
 def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None, samples: int = _LOOKS) -> float:
     """The factor by which a law must be slowed (or may be hastened, below 1) to keep the limits along its path.
 
-    Slowed by k, a law's u and x fall as 1/k^2: the joint limits give k at once, the drives' by bisection above it. Where a
-    drive cannot even hold the load somewhere no slowness mends the move, and the joint limits alone decide.
+    Slowed by k, velocities fall as 1/k and accelerations as 1/k^2: the joint limits give k at once. What the drives ask for
+    besides is a root above it. Where a drive cannot even hold the load somewhere no slowness mends the move, and the joint
+    limits alone decide.
     """
     t = Motion(path, law).times(samples)
-    demands = path_dynamics(boom, path, np.clip(np.asarray(law.s(t)), 0.0, 1.0), base)
-    x, u = np.asarray(law.s(t, 1)) ** 2, np.asarray(law.s(t, 2))
-    acceleration = np.abs(demands.p1 * u[:, None] + demands.p2 * x[:, None]) / boom.limits.acceleration
-    least = float(np.sqrt(max(acceleration.max(), (x / demands.x_max).max())))
-    at_rest = np.abs(demands.torque_ratio(np.zeros_like(u), np.zeros_like(x))).max()
+    s, v, u = (np.asarray(law.s(t, order))[:, None] for order in range(3))
+    q, p1, p2 = (path(np.clip(s[:, 0], 0.0, 1.0), order) for order in range(3))
+    qd, qdd = p1 * v, p1 * u + p2 * v**2
+    least = _joint_stretch(boom, qd, qdd)
+    if not limited_by_drives(boom):
+        return least
+    dynamic = inverse_dynamics(boom, q, qd / least, qdd / least**2, base=base, reactions=False).tau
+    rubbing = boom.friction.coulomb * np.sign(p1)
+    if (_drive_ratio(boom, dynamic, qd / least, qdd / least**2, rubbing) <= 1.0).all():
+        return least
+    zero = np.zeros_like(q)
+    static = inverse_dynamics(boom, q, zero, zero, base=base, reactions=False).tau
+    return _drive_stretch(boom, least, qd, qdd, static, (dynamic - static) * least**2, rubbing)
 
-    def kept(k: float) -> bool:
-        return bool((demands.torque_ratio(u / k**2, x / k**2) <= 1.0).all())
 
-    if at_rest >= 1.0 or kept(least):
+@dataclass(frozen=True, eq=False)
+class PathLoads:
+    """A path's torques a u + b x + c, interpolated along it: for a search that asks for them many times."""
+
+    boom: Boom
+    path: Path
+    torques: "CubicSpline"
+    """s to (3, 5): a, b and c"""
+
+    @staticmethod
+    def along(boom: Boom, path: Path, base: BaseMotion | None = None) -> "PathLoads":
+        """The loads of a path on a base that is tilted at most."""
+        from scipy.interpolate import CubicSpline
+
+        s = spread(path, _LOAD_INTERVALS)
+        demands = path_dynamics(boom, path, s, base)
+        return PathLoads(boom, path, CubicSpline(s, np.stack([demands.a, demands.b, demands.c], axis=1)))
+
+    def least_stretch(self, law: TimeLaw, t: Array) -> float:
+        """As the function `least_stretch`, at times t (n,) of a law."""
+        s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
+        s, v, u = np.clip(s, 0.0, 1.0), v[:, None], u[:, None]
+        p1 = self.path(s, 1)
+        qd, qdd = p1 * v, p1 * u + self.path(s, 2) * v**2
+        least = _joint_stretch(self.boom, qd, qdd)
+        if not limited_by_drives(self.boom):
+            return least
+        a, b, c = np.moveaxis(self.torques(s), 1, 0)
+        rubbing = self.boom.friction.coulomb * np.sign(p1)
+        return _drive_stretch(self.boom, least, qd, qdd, c, a * u + b * v**2, rubbing)
+
+
+def _joint_stretch(boom: Boom, qd: Array, qdd: Array) -> float:
+    limits = boom.limits
+    return float(max((np.abs(qd) / limits.velocity).max(), np.sqrt((np.abs(qdd) / limits.acceleration).max())))
+
+
+def _drive_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array, rubbing: Array) -> Array:
+    """(n, 5) the larger of gearbox and motor torque over their limits, without friction and with it.
+
+    Friction earns no credit while braking.
+
+    Args:
+        tau: (n, 5) torques without friction.
+        rubbing: (n, 5) Coulomb friction.
+    """
+    ratio, viscous = load_ratio(boom, tau, qd, qdd), boom.friction.viscous
+    if not (rubbing.any() or viscous.any()):
+        return ratio
+    return np.maximum(ratio, load_ratio(boom, tau + rubbing + viscous * qd, qd, qdd))
+
+
+def _drive_stretch(boom: Boom, least: float, qd: Array, qdd: Array, static: Array, dynamic: Array, rubbing: Array) -> float:
+    """The least factor from `least` on at which torques static + dynamic / k^2, and friction, keep the drives' limits.
+
+    `least` itself where a drive cannot even hold the load.
+    """
+    from scipy.optimize import brentq
+
+    zero = np.zeros_like(qd)
+    if (_drive_ratio(boom, static, zero, zero, rubbing) >= 1.0).any():
+        return least
+
+    def excess(k: float) -> float:
+        worst = _drive_ratio(boom, static + dynamic / k**2, qd / k, qdd / k**2, rubbing).max()
+        return float(min(worst, _FINITE)) - 1.0
+
+    if excess(least) <= 0.0:
         return least
     slow = 2.0 * least
-    while not kept(slow):
+    while excess(slow) > 0.0:
         slow *= 2.0
-    fast = slow / 2.0
-    for _ in range(_LEAST_STRETCH_STEPS):
-        middle = (fast + slow) / 2.0
-        fast, slow = (fast, middle) if kept(middle) else (middle, slow)
-    return slow
+    near = _ROOT * least
+    return float(brentq(excess, least, slow, xtol=near)) + near
+
+
+def peak_rate_ratios(boom: Boom, motion: Motion, t: Array) -> tuple[float, float, float]:
+    """The largest ratios of the joints' velocity, acceleration and jerk to their limits at times t (n,)."""
+    limits = boom.limits
+    if isinstance(motion.path, JointLine):  # the peaks of the law decide
+        peaks = (float(np.abs(motion.law.s(t, order)).max()) for order in (1, 2, 3))
+        velocity, acceleration, jerk = (peak / limit for peak, limit in zip(peaks, path_limits(boom, motion.path), strict=True))
+        return velocity, acceleration, jerk
+    _, *rates = motion(t)
+    velocity, acceleration, jerk = (
+        float((np.abs(rate) / limit).max())
+        for rate, limit in zip(rates, (limits.velocity, limits.acceleration, limits.jerk), strict=True)
+    )
+    return velocity, acceleration, jerk
 
 
 def jerk_stretch(boom: Boom, path: Path, law: TimeLaw, samples: int = 20_001) -> float:
     """The factor by which a law must be slowed to keep the joints' jerk limits; below 1 where it may be hastened."""
     motion = Motion(path, law)
-    _, _, _, qddd = motion(motion.times(samples))
-    return float(np.cbrt((np.abs(qddd) / boom.limits.jerk).max()))
+    return float(np.cbrt(peak_rate_ratios(boom, motion, motion.times(samples))[2]))
 
 
 def looks(path: Path) -> int:
@@ -200,12 +286,19 @@ def looks(path: Path) -> int:
     return _LOOKS if isinstance(path, JointLine) else _CURVED_LOOKS
 
 
+def spread(path: Path, intervals: int) -> Array:
+    """Places s from 0 to 1 in so many steps, and in at least `_BETWEEN` between two knots of the path, which are among them."""
+    edges = np.concatenate([[0.0], path.knots, [1.0]])
+    steps = np.maximum(np.ceil(np.diff(edges) * intervals - _ROUNDING), _BETWEEN if len(path.knots) else 1).astype(int)
+    return np.unique(np.concatenate([np.linspace(a, b, n + 1) for a, b, n in zip(edges[:-1], edges[1:], steps, strict=True)]))
+
+
 def path_limits(boom: Boom, path: Path) -> tuple[float, float, float]:
     """The least of limit / |p'| over joints and path, for velocity, acceleration and jerk.
 
     On a straight path they bound the first, second and third time derivative of s.
     """
-    step = np.abs(path(np.linspace(0.0, 1.0, _SLOPES), 1)).max(axis=0)
+    step = np.abs(path(spread(path, 1 if isinstance(path, JointLine) else _SLOPES), 1)).max(axis=0)
     limits = boom.limits
     with np.errstate(divide="ignore"):
         velocity, acceleration, jerk = (

@@ -154,7 +154,8 @@ class TimeOptimal(TimingProfile):
 
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
         from planner.timing.profiles.average_torque import within_average_torque
-        from planner.timing.profiles.time_optimal import time_optimal, with_jerk_bound
+        from planner.timing.profiles.jerk_bound import with_jerk_bound
+        from planner.timing.profiles.time_optimal import time_optimal
 
         law = within_average_torque(boom, path, base) if self.average_torque else time_optimal(boom, path, base)
         if not self.jerk_bound:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 _BESIDE = 1e-9  # relative; so near to a knot of the path that it stands for its side
+_BETWEEN = 32  # steps between two knots of the path, at least
 _LEFT_OF = 1e-12  # relative; so near to a piece's end that it stands for the end itself
 
 
@@ -120,14 +121,19 @@ class Motion:
         return self.law.duration
 
     def times(self, samples: int) -> Array:
-        """At least that many times, equal within each piece of the law, with both sides of every jump of law and path."""
+        """At least that many times, equal within each piece of the law, with both sides of every jump of law and path.
+
+        Between two knots of the path, however near, there are some as well.
+        """
         t = self.law.times(max(3, -(-samples // (len(self.law.s.x) - 1))))
         passed = [self.law.s.solve(knot, extrapolate=False) for knot in self.path.knots]
         if not passed:
             return t
         at = np.concatenate(passed)
+        at = np.sort(at[np.isfinite(at)])
         beside = np.concatenate([at - _BESIDE * self.duration, at + _BESIDE * self.duration])
-        return np.sort(np.concatenate([t, np.clip(beside[np.isfinite(beside)], 0.0, self.duration)]))
+        between = np.linspace(np.append(0.0, at), np.append(at, self.duration), _BETWEEN + 1)
+        return np.sort(np.concatenate([t, np.clip(beside, 0.0, self.duration), between.ravel()]))
 
     def __call__(self, t: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """q, qd, qdd and qddd at the times t, each (..., 5), by the chain rule; t outside the move is clipped to it.
@@ -136,7 +142,7 @@ class Motion:
         """
         inside = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         s, v, a, j = (np.asarray(self.law.s(inside, order)) for order in range(4))
-        s = np.clip(s, 0.0, 1.0)
+        s, v = np.clip(s, 0.0, 1.0), np.maximum(v, 0.0)  # no law goes back, rounding apart: friction has a direction
         p = [self.path(s, order) for order in range(4)]
         v, a, j = v[..., None], a[..., None], j[..., None]
         return p[0], p[1] * v, p[2] * v**2 + p[1] * a, p[3] * v**3 + 3.0 * p[2] * v * a + p[1] * j

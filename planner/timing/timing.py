@@ -7,16 +7,18 @@ import numpy as np
 
 from boom_model import JOINTS, BaseMotion, Boom, InfeasibleError, InputError
 from boom_model.arrays import Array, scalar
-from planner.checks.certificate import WorstRatio, certify
 from planner.paths.clearance import require_path_clear
 from planner.paths.path import JointLine, Path, SplinePath
-from planner.timing.path_limits import jerk_stretch, least_stretch, looks, shares
+from planner.timing.path_limits import least_stretch, looks, shares
 from planner.timing.profile import Cubic, Profile, TimingProfile, parse_profile
 from planner.timing.time_law import Motion
+from planner.timing.worst_ratios import WorstRatio, joint_stretch, worst_ratios
 
 __all__ = ["Profile", "Timing", "timed"]
 
 _ROUNDING = 1e-9
+_MISSED = 1e-5  # relative; what is missed by less is left as it is
+_TRIES = 5  # the derivatives of a very short line of the tip are rounding in part, and come out otherwise each time
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,11 +83,13 @@ def _least(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> M
     motion = timing.profile.motion(boom, path, base)
     if isinstance(path, JointLine) and timing.profile.exact_on_lines:
         return motion
-    samples = looks(motion.path)
-    missed = least_stretch(boom, motion.path, motion.law, base, samples)
-    if motion.law.jerk_limited:
-        missed = max(missed, jerk_stretch(boom, motion.path, motion.law, samples))
-    return _slowed(motion, max(1.0, missed))
+    motion = _slowed(motion, max(1.0, least_stretch(boom, motion.path, motion.law, base, looks(motion.path))))
+    for _ in range(_TRIES):
+        missed = joint_stretch(boom, motion)
+        if missed <= 1.0 + _MISSED:
+            break
+        motion = _slowed(motion, missed)
+    return motion
 
 
 def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, velocities: Array, base: BaseMotion | None) -> Motion:
@@ -111,7 +115,7 @@ def _too_short(
 ) -> str:
     """How far a duration is from the least, and which limit it would break most."""
     hasty = [_slowed(motion, asked / least) for motion in motions]
-    worst = max(certify(boom, hasty, base, timing.profile.limits_average_torque).worst, key=lambda each: each.ratio)
+    worst = max(worst_ratios(boom, hasty, base, timing.profile.limits_average_torque), key=lambda each: each.ratio)
     when = "" if worst.at_s is None else f" at {worst.at_s:.2f} s"
     parts = f" ({_parts(boom, hasty, worst, base)})" if worst.limit in _INSTANT else ""
     return (

@@ -7,8 +7,8 @@ import pytest
 
 from boom_model import Basis, Boom, Friction, InputError, Mount, Origin, Sourced, inverse_dynamics
 from planner import Trajectory, Verdict, check, plan
-from planner.checks.motion_checks import average_torque
 from planner.motion.trajectory import sample
+from planner.timing.travel_mean import average_torque
 from planner.validation.tables import table_2_4_motion
 
 BOOM = Boom.load()

@@ -8,12 +8,12 @@ import pytest
 
 from boom_model import Boom, InfeasibleError, InputError, forward_kinematics
 from planner import Cubic, Trajectory, Verdict, check, plan
-from planner.checks.motion_checks import average_torque
 from planner.missions.mission import check_cycle, load_mission, named_missions, plan_cycle
 from planner.motion.trajectory import joined
 from planner.motion.vehicle import load_case
 from planner.planning import torques
 from planner.timing.profile import Profile
+from planner.timing.travel_mean import average_torque
 from tests.field_day import field_day
 
 BOOM = Boom.load()

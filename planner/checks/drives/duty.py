@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from boom_model import Sourced
-from boom_model.arrays import Array, Mask, read_only
+from boom_model.arrays import Array, Mask
+from planner.timing.travel_mean import trapezoid_weights, travel_mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +37,4 @@ class Duty:
 
     def travel_mean(self, load: Array, rate: Array) -> float | None:
         """Cube mean of a load weighted by travel, (int |rate| |load|^3 dt / int |rate| dt)^(1/3); None without travel."""
-        share = self.weight * np.abs(rate)
-        travel = float(share.sum())
-        return float((share @ np.abs(load) ** 3 / travel) ** (1.0 / 3.0)) if travel > 0.0 else None
-
-
-def trapezoid_weights(t: Array) -> Array:
-    """Weights (n,) [s] of the trapezoidal rule at times t (n,)."""
-    weight = np.zeros(t.shape)
-    weight[:-1] += np.diff(t) / 2.0
-    weight[1:] += np.diff(t) / 2.0
-    return read_only(weight)
+        return travel_mean(self.weight, load, rate)

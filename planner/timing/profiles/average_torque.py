@@ -6,11 +6,11 @@ import numpy as np
 
 from boom_model import JOINTS, BaseMotion, Boom, Drive, inverse_dynamics
 from boom_model.arrays import Array
-from planner.checks.motion_checks import average_torque
 from planner.paths.path import Path
 from planner.timing.path_limits import InfeasiblePathError, path_dynamics
 from planner.timing.profiles.time_optimal import GRID_INTERVALS, time_optimal
 from planner.timing.time_law import Motion, TimeLaw
+from planner.timing.travel_mean import average_torque
 
 _STEPS = 12
 _SLOWEST = 1e3

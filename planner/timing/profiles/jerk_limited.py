@@ -6,8 +6,9 @@ from boom_model import BaseMotion, Boom, InfeasibleError
 from planner.paths.path import Path
 from planner.timing.path_limits import jerk_stretch, least_stretch, path_limits
 from planner.timing.profiles.cubic import cubic
+from planner.timing.profiles.jerk_bound import with_jerk_bound
 from planner.timing.profiles.ruckig_pieces import pieces
-from planner.timing.profiles.time_optimal import time_optimal, with_jerk_bound
+from planner.timing.profiles.time_optimal import time_optimal
 from planner.timing.time_law import TimeLaw
 
 _ROUNDING = 1e-9

@@ -20,11 +20,10 @@ from planner.timing.path_limits import (
     PathDynamics,
     explain_infeasible,
     gear_limits,
-    jerk_stretch,
-    least_stretch,
     motor_limits,
     path_dynamics,
     rotors,
+    spread,
     static_limits,
 )
 from planner.timing.time_law import TimeLaw
@@ -37,9 +36,6 @@ _MET = 1e-3
 _FINITE = 1e12
 _ROUNDING = 1e-8
 _TRIES = 10
-_NARROWEST = -2.5  # of the windows to average over: the power of ten, as a share of the duration
-_WINDOWS = 11
-_WINDOW_TOLERANCE = 1e-3
 
 _Rows = tuple[Array, Array, Array]
 
@@ -47,8 +43,8 @@ _Rows = tuple[Array, Array, Array]
 def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, intervals: int = GRID_INTERVALS) -> TimeLaw:
     """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
 
-    The path acceleration is constant over each of the `intervals` equal steps in s, and the conditions hold at both ends of
-    each step (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step.
+    The path acceleration is constant over each of the `intervals` steps in s (more where knots of the path are near), and the
+    conditions hold at both ends of each step (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step.
 
     A drive's limit falls with its speed and viscous friction grows with it; toppra holds only what is linear in u and x. Both
     are therefore replaced by their tangents, which never allow more than the true ones: taken at low speed first, then at the
@@ -59,12 +55,12 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
         InfeasiblePathError: no law keeps the limits, or a drive could not stop and hold its load somewhere;
             names the joint, the place, the demand and the limit.
     """
-    s = np.linspace(0.0, 1.0, intervals + 1)
+    s = spread(path, intervals)
     demands = path_dynamics(boom, path, s, base)
     if (demands.static_ratio > 1.0).any():  # a swing might carry the load past such a place, but could not stop at it
         raise explain_infeasible(demands)
     unit = _time_scale(demands)
-    few = np.unique(np.linspace(0, intervals, min(intervals, _ROUGH_INTERVALS) + 1).astype(int))
+    few = np.unique(np.linspace(0, len(s) - 1, min(intervals, _ROUGH_INTERVALS) + 1).astype(int))
     rough, found = _iterate(demands.at(few), path, np.zeros(len(few)), unit), None
     if rough is not None:
         unit = float(_durations(s[few], rough.speed).sum())
@@ -136,27 +132,6 @@ def _breakable(rows: _Rows, demands: PathDynamics) -> _Rows:
     return a[:, kept], b[:, kept], c[:, kept]
 
 
-def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None) -> TimeLaw:
-    """A law averaged over a window and slowed until it keeps the joints' jerk limits besides their others.
-
-    Averaging s(t) neither leaves the path nor starts or ends in motion, makes the acceleration continuous and 0 at both ends,
-    and bounds the jerk by the jump of the acceleration over the window. What it shifts past a limit an even slowing mends; the
-    window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
-    makes the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is not the optimum.
-    """
-    from scipy.optimize import minimize_scalar
-
-    def smooth(exponent: float) -> TimeLaw:
-        smoothed = law.averaged(law.duration * 10.0**exponent)
-        return smoothed.stretched(max(1.0, jerk_stretch(boom, path, smoothed), least_stretch(boom, path, smoothed, base)))
-
-    exponents = np.linspace(_NARROWEST, 0.0, _WINDOWS)
-    least = int(np.argmin([smooth(exponent).duration for exponent in exponents]))
-    around = exponents[max(least - 1, 0)], exponents[min(least + 1, _WINDOWS - 1)]
-    found = minimize_scalar(lambda x: smooth(x).duration, bounds=around, method="bounded", options={"xatol": _WINDOW_TOLERANCE})
-    return min(smooth(float(found.x)), smooth(float(exponents[least])), key=lambda each: each.duration)
-
-
 def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
     """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,)."""
     boom, zero = demands.boom, np.zeros_like(demands.s)
@@ -194,22 +169,22 @@ def _solve(condition: "_Condition", path: Path, s: Array) -> Array | None:
     also asks for the least such x; here it is 0, because the load can be held at rest everywhere.
     """
     solver = seidelWrapper([condition], _ToppraPath(path), s)
-    step, top, x = solver.get_deltas(), np.zeros_like(s), np.zeros_like(s)
-    highest = np.array([1e-9, -1.0])
-    for i in range(len(step) - 1, -1, -1):
-        top[i] = solver.solve_stagewise_optim(i, None, highest, np.nan, np.nan, 0.0, top[i + 1])[1]
+    steps, top, x = solver.get_deltas(), [0.0] * len(s), [0.0] * len(s)
+    highest, onwards = np.array([1e-9, -1.0]), np.stack([-2.0 * steps, np.full(len(steps), -1.0)], axis=1)
+    free = math.nan
+    for i in range(len(steps) - 1, -1, -1):
+        top[i] = solver.solve_stagewise_optim(i, None, highest, free, free, 0.0, top[i + 1])[1]
         if math.isnan(top[i]):
             return None
-    for i in range(len(step)):
-        onwards = np.array([-2.0 * step[i], -1.0])
+    for i, step in enumerate(steps.tolist()):
         for _ in range(_TRIES):  # rounding may put x a little above what can be reached from
-            u = solver.solve_stagewise_optim(i, None, onwards, x[i], x[i], 0.0, top[i + 1])[0]
+            u = float(solver.solve_stagewise_optim(i, None, onwards[i], x[i], x[i], 0.0, top[i + 1])[0])
             if not math.isnan(u):
                 break
             x[i] *= 1.0 - 1e-3
         else:
             return None
-        reached = x[i] + 2.0 * step[i] * u
+        reached = x[i] + 2.0 * step * u
         x[i + 1] = min(top[i + 1], max(reached - _ROUNDING, reached * (1.0 - 1e-4), 0.0))
     return np.sqrt(x)
 

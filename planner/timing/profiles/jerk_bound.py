@@ -1,0 +1,45 @@
+"""A law whose acceleration jumps, smoothed until the joints' jerk limits are kept."""
+
+from functools import cache
+
+import numpy as np
+
+from boom_model import BaseMotion, Boom
+from planner.paths.path import Path
+from planner.timing.path_limits import PathLoads, peak_rate_ratios
+from planner.timing.time_law import Motion, TimeLaw
+
+_NARROWEST = -2.5  # of the windows to average over: the power of ten, as a share of the duration
+_WINDOWS = 11
+_WINDOW_TOLERANCE = 1e-3
+
+
+def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None) -> TimeLaw:
+    """A law averaged over a window and slowed until it keeps the joints' jerk limits besides their others.
+
+    Averaging s(t) neither leaves the path nor starts or ends in motion, makes the acceleration continuous and 0 at both ends,
+    and bounds the jerk by the jump of the acceleration over the window. What it shifts past a limit an even slowing mends; the
+    window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
+    makes the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is not the optimum.
+
+    The limits are looked at where the law's pieces meet, with torques interpolated along the path: between these places the
+    law may break them by a trifle.
+    """
+    from scipy.optimize import minimize_scalar
+
+    loads = PathLoads.along(boom, path, base)
+
+    @cache
+    def smooth(exponent: float) -> TimeLaw:
+        smoothed = law.averaged(law.duration * 10.0**exponent)
+        motion = Motion(path, smoothed)
+        jerk = float(np.cbrt(peak_rate_ratios(boom, motion, smoothed.times(2))[2]))
+        return smoothed.stretched(max(1.0, jerk, loads.least_stretch(smoothed, smoothed.s.x)))
+
+    exponents = np.linspace(_NARROWEST, 0.0, _WINDOWS)
+    least = int(np.argmin([smooth(float(exponent)).duration for exponent in exponents]))
+    around = exponents[max(least - 1, 0)], exponents[min(least + 1, _WINDOWS - 1)]
+    found = minimize_scalar(
+        lambda x: smooth(float(x)).duration, bounds=around, method="bounded", options={"xatol": _WINDOW_TOLERANCE}
+    )
+    return min(smooth(float(found.x)), smooth(float(exponents[least])), key=lambda each: each.duration)
