@@ -141,6 +141,10 @@ class JerkLimited(TimingProfile):
     def limits_jerk(self) -> bool:
         return True
 
+    @property
+    def exact_on_lines(self) -> bool:
+        return False
+
 
 @dataclass(frozen=True)
 class TimeOptimal(TimingProfile):

@@ -44,7 +44,8 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
     """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
 
     The path acceleration is constant over each of the `intervals` steps in s (more where knots of the path are near), and the
-    conditions hold at both ends of each step (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step.
+    conditions hold at both ends of each step (toppra's interpolation scheme). Between them the torques can exceed their limits
+    by the square of the step.
 
     A drive's limit falls with its speed and viscous friction grows with it; toppra holds only what is linear in u and x. Both
     are therefore replaced by their tangents, which never allow more than the true ones: taken at low speed first, then at the
