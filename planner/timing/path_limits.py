@@ -20,12 +20,12 @@ from boom_model.boom import IS_LENGTH
 from boom_model.drives.drive import drive_inertia, motor_limit
 from boom_model.dynamics.base_motion import BaseMotion
 from planner.paths.path import JointLine, Path
+from planner.timing.roots import just_kept
 from planner.timing.time_law import Motion, TimeLaw
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-_ROOT = 1e-12  # relative accuracy of a root
 _FINITE = 1e12
 _LEAST_SHARE = 1e-6
 _SLOPES = 20_000
@@ -65,16 +65,18 @@ class PathDynamics:
     viscous: Array
     """(n, 5) viscous friction per s'"""
     base: BaseMotion | None
+    cap: Array
+    """(n,) a bound on x besides the joint velocities'"""
 
     def at(self, points: Array) -> "PathDynamics":
         """The same at some of the points, by their numbers."""
-        names = ("s", "p1", "p2", "a", "b", "c", "coulomb", "viscous")
+        names = ("s", "p1", "p2", "a", "b", "c", "coulomb", "viscous", "cap")
         return replace(self, **{name: getattr(self, name)[points] for name in names})
 
     @property
     def x_max(self) -> Array:
-        """(n,) the bound that the joint velocities set on x."""
-        return _largest_x(self.boom, self.p1)
+        """(n,) the largest x that the joint velocities and the cap allow."""
+        return np.minimum(_largest_x(self.boom, self.p1), self.cap)
 
     def friction_tangent(self, x: Array) -> tuple[Array, Array]:
         """(n, 5) twice: intercept and slope over x of a line that friction, coulomb + viscous sqrt(x), never exceeds.
@@ -152,13 +154,24 @@ def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = No
     states = [p, p, p], [zero, zero, p1], [zero, p1, p2]
     static, pushed, carried = inverse_dynamics(boom, *states, base=base, reactions=False).tau
     coulomb, viscous = boom.friction.coulomb * np.sign(p1), boom.friction.viscous * p1
-    return PathDynamics(boom, path, s, p1, p2, pushed - static, carried - static, static, coulomb, viscous, base)
+    cap = np.full(len(s), np.inf)
+    return PathDynamics(boom, path, s, p1, p2, pushed - static, carried - static, static, coulomb, viscous, base, cap)
 
 
 def _largest_x(boom: Boom, p1: Array) -> Array:
     with np.errstate(divide="ignore"):
         bound: Array = np.min((boom.limits.velocity / np.abs(p1)) ** 2, axis=-1)
     return bound
+
+
+def demand_ratios(boom: Boom, path: Path, law: TimeLaw, t: Array, base: BaseMotion | None = None) -> tuple[Array, Array]:
+    """(n,) twice: the largest ratio to a joint's acceleration limit, and to a drive's, at times t (n,) of a law."""
+    s, v, u = (np.asarray(law.s(t, order))[:, None] for order in range(3))
+    q, p1, p2 = (path(np.clip(s[:, 0], 0.0, 1.0), order) for order in range(3))
+    qd, qdd = p1 * v, p1 * u + p2 * v**2
+    tau = inverse_dynamics(boom, q, qd, qdd, base=base, reactions=False).tau
+    drives = _drive_ratio(boom, tau, qd, qdd, boom.friction.coulomb * np.sign(p1))
+    return (np.abs(qdd) / boom.limits.acceleration).max(axis=1), drives.max(axis=1)
 
 
 def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None, samples: int = _LOOKS) -> float:
@@ -241,23 +254,19 @@ def _drive_stretch(boom: Boom, least: float, qd: Array, qdd: Array, static: Arra
 
     `least` itself where a drive cannot even hold the load.
     """
-    from scipy.optimize import brentq
-
     zero = np.zeros_like(qd)
     if (_drive_ratio(boom, static, zero, zero, rubbing) >= 1.0).any():
         return least
 
     def excess(k: float) -> float:
-        worst = _drive_ratio(boom, static + dynamic / k**2, qd / k, qdd / k**2, rubbing).max()
-        return float(min(worst, _FINITE)) - 1.0
+        return float(_drive_ratio(boom, static + dynamic / k**2, qd / k, qdd / k**2, rubbing).max()) - 1.0
 
     if excess(least) <= 0.0:
         return least
     slow = 2.0 * least
     while excess(slow) > 0.0:
         slow *= 2.0
-    near = _ROOT * least
-    return float(brentq(excess, least, slow, xtol=near)) + near
+    return just_kept(excess, slow / 2.0, slow)
 
 
 def peak_rate_ratios(boom: Boom, motion: Motion, t: Array) -> tuple[float, float, float]:

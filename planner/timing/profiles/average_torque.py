@@ -1,19 +1,22 @@
 """The time-optimal law within the gearboxes' average torque as well."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from boom_model import JOINTS, BaseMotion, Boom, Drive, inverse_dynamics
 from boom_model.arrays import Array
 from planner.paths.path import Path
-from planner.timing.path_limits import InfeasiblePathError, path_dynamics
+from planner.timing.path_limits import InfeasiblePathError, path_dynamics, spread
 from planner.timing.profiles.time_optimal import GRID_INTERVALS, time_optimal
+from planner.timing.roots import just_kept
 from planner.timing.time_law import Motion, TimeLaw
 from planner.timing.travel_mean import average_torque
 
-_STEPS = 12
 _SLOWEST = 1e3
+_SLOWING_ACCURACY = 1e-10
+_SHARE_ACCURACY = 2e-4
 _EACH = 3
 
 
@@ -21,7 +24,7 @@ def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None
     """The fastest law found whose average torque no gearbox's sheet forbids.
 
     Along a path the average, (int |tau|^3 |p'| ds / int |p'| ds)^(1/3), depends on the whole motion, which toppra cannot
-    take in. Two ways are searched by bisection, and the faster taken: a cap on the gearboxes' torque, between what holding the
+    take in. Two ways are searched, and the faster taken: a cap on the gearboxes' torque, between what holding the
     load asks for and the unbounded law's peak, all joints' in proportion; and slowing that law evenly.
 
     Raises:
@@ -30,35 +33,34 @@ def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None
     sharp = time_optimal(boom, path, base)
     limits = np.array([(drive and drive.gearbox.max_average_torque) or np.inf for drive in boom.drives])
 
-    def over(law: TimeLaw) -> bool:
-        return bool((_averages(boom, path, law, base) > limits).any())
+    def excess(law: TimeLaw) -> float:
+        return float((_averages(boom, path, law, base) / limits).max()) - 1.0
 
-    if not over(sharp):
+    if excess(sharp) <= 0.0:
         return sharp
     slowest = sharp.stretched(_SLOWEST)
-    if over(slowest):
+    if excess(slowest) > 0.0:
         raise _held_too_much(boom, path, slowest, limits, base)
-    quick, slow = 1.0, _SLOWEST
-    for _ in range(2 * _STEPS):
-        middle = np.sqrt(quick * slow)
-        quick, slow = (middle, slow) if over(sharp.stretched(middle)) else (quick, middle)
-    even = sharp.stretched(slow)
-    best, solves = even, sharp.iterations
-    floor = np.abs(path_dynamics(boom, path, np.linspace(0.0, 1.0, GRID_INTERVALS + 1), base).c).max(axis=0)
+    even = sharp.stretched(just_kept(lambda slowing: excess(sharp.stretched(slowing)), 1.0, _SLOWEST, _SLOWING_ACCURACY))
+    floor = np.abs(path_dynamics(boom, path, spread(path, GRID_INTERVALS), base).c).max(axis=0)
     peak = np.abs(_torque(boom, Motion(path, sharp), base)[2]).max(axis=0)
-    low, high = 0.0, 1.0
-    for _ in range(_STEPS):
-        share = (low + high) / 2.0
+    laws: list[TimeLaw] = []
+
+    @cache
+    def excess_of_share(share: float) -> float:
+        """Of the law capped at a share of the way from the held load to the peak; one that cannot move exceeds nothing."""
         try:
             capped = time_optimal(_capped(boom, floor + share * (peak - floor)), path, base)
         except InfeasiblePathError:
-            low = share
-            continue
-        solves += capped.iterations
-        low, high = (low, share) if over(capped) else (share, high)
-        if not over(capped) and capped.duration < best.duration:
-            best = capped
-    return replace(best, iterations=solves, residual=max(best.residual, high - low if best is not even else 0.0))
+            return -1.0
+        laws.append(capped)
+        return excess(capped)
+
+    if excess_of_share(0.0) <= 0.0 < excess_of_share(1.0):
+        just_kept(excess_of_share, 1.0, 0.0, _SHARE_ACCURACY)
+    best = min((law for law in (even, *laws) if excess(law) <= 0.0), key=lambda each: each.duration)
+    solves = sharp.iterations + sum(law.iterations for law in laws)
+    return replace(best, iterations=solves, residual=max(best.residual, 0.0 if best is even else _SHARE_ACCURACY))
 
 
 def _torque(boom: Boom, motion: Motion, base: BaseMotion | None) -> tuple[Array, Array, Array]:

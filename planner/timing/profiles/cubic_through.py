@@ -8,6 +8,7 @@ from boom_model import JOINTS, BaseMotion, Boom, InfeasibleError, inverse_dynami
 from boom_model.arrays import Array
 from planner.paths.path import SplinePath, overshoot, spaced
 from planner.timing.path_limits import least_stretch, load_ratio
+from planner.timing.roots import just_kept
 from planner.timing.time_law import Motion, TimeLaw
 
 _EVALUATIONS = 60  # of the search, a segment
@@ -15,7 +16,6 @@ _MOST_EVALUATIONS = 600
 _COARSE, _FINE = 501, 8001
 _SPREAD = 0.3
 _TRIES = 240  # durations of a segment that are tried
-_BISECTIONS = 30
 _LOOKS = 129
 
 
@@ -141,8 +141,4 @@ def _least_segment(boom: Boom, segment: int, q: Array, qd: Array, base: BaseMoti
     first = int(np.argmax(good))
     if first == 0:
         return float(tried[0])
-    short, long = tried[first - 1], tried[first]
-    for _ in range(_BISECTIONS):
-        middle = np.sqrt(short * long)
-        short, long = (short, middle) if (ratio(np.array([middle])) <= 1.0).all() else (middle, long)
-    return float(long)
+    return just_kept(lambda length: float(ratio(np.array([length])).max()) - 1.0, float(tried[first - 1]), float(tried[first]))

@@ -15,9 +15,10 @@ from toppra.solverwrapper.cy_seidel_solverwrapper import seidelWrapper
 from boom_model import BaseMotion, Boom
 from boom_model.arrays import Array
 from boom_model.drives.drive import drive_torque_tangent
-from planner.paths.path import Path
+from planner.paths.path import JointLine, Path
 from planner.timing.path_limits import (
     PathDynamics,
+    demand_ratios,
     explain_infeasible,
     gear_limits,
     motor_limits,
@@ -33,6 +34,8 @@ _ROUGH_INTERVALS = 50  # of a first law, on which the tangents settle for a tent
 _SOLVES = 20
 _CONVERGED = 3e-4  # share of a limit that tangents at the law itself would add where it is met: the next solve gains less
 _MET = 1e-3
+_INSIDE = np.linspace(0.0, 1.0, 9)[1:-1]  # of a step
+_REPAIRS = 8
 _FINITE = 1e12
 _ROUNDING = 1e-8
 _TRIES = 10
@@ -43,9 +46,10 @@ _Rows = tuple[Array, Array, Array]
 def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, intervals: int = GRID_INTERVALS) -> TimeLaw:
     """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
 
-    The path acceleration is constant over each of the `intervals` steps in s (more where knots of the path are near), and the
-    conditions hold at both ends of each step (toppra's interpolation scheme). Between them the torques can exceed their limits
-    by the square of the step.
+    The path acceleration is constant over each of the `intervals` steps in s, and the conditions hold at both ends of each
+    (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step. The steps are
+    equal, and shorter between knots of the path that are near to each other. On a curved path the speed is capped where a
+    limit is broken inside a step all the same, and the law solved for again.
 
     A drive's limit falls with its speed and viscous friction grows with it; toppra holds only what is linear in u and x. Both
     are therefore replaced by their tangents, which never allow more than the true ones: taken at low speed first, then at the
@@ -70,6 +74,44 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
         found = _iterate(demands, path, np.zeros_like(s), unit)
     if found is None:
         raise explain_infeasible(demands)
+    return _law(s, found) if isinstance(path, JointLine) else _repaired(demands, found, unit)
+
+
+def _repaired(demands: PathDynamics, found: "_Found", unit: float) -> TimeLaw:
+    """The law of a solve, slower where a limit is broken inside a step.
+
+    Where a joint turns back p' is 0 and p'' may jump: there the speed that both ends of a step allow can be too much between
+    them, however short the step. It is capped at both ends, and solved for again; of all these laws that is taken which is
+    the shortest once it is slowed by what it still breaks.
+    """
+    laws: list[tuple[float, TimeLaw]] = []
+    for _ in range(_REPAIRS):
+        law, x = _law(demands.s, found), found.speed**2
+        acceleration, drives = _between(demands, law)
+        held = demands.static_ratio.max(axis=1)  # of a drive's load, which no slowness lessens
+        too_fast = np.maximum(acceleration, (drives - held) / np.maximum(1.0 - held, _ROUNDING))
+        laws.append((law.duration * math.sqrt(max(1.0, too_fast.max())), law))
+        if max(acceleration.max(), drives.max()) <= 1.0 + _MET:
+            break
+        demands = replace(demands, cap=np.where(too_fast > 1.0, x / too_fast, demands.cap))
+        again = _iterate(demands, demands.path, x, unit)
+        if again is None:
+            break
+        found = again
+    return min(laws, key=lambda each: each[0])[1]
+
+
+def _between(demands: PathDynamics, law: TimeLaw) -> tuple[Array, Array]:
+    """(n,) twice by grid point, the worst ratio to acceleration and drive limits inside the steps on either side of it."""
+    start, length = law.s.x[:-1, None], np.diff(law.s.x)[:, None]
+    t = start + length * _INSIDE
+    ratios = demand_ratios(demands.boom, demands.path, law, t.ravel(), demands.base)
+    steps = [each.reshape(t.shape).max(axis=1) for each in ratios]
+    acceleration, drives = (np.maximum(np.append(each, 0.0), np.append(0.0, each)) for each in steps)
+    return acceleration, drives
+
+
+def _law(s: Array, found: "_Found") -> TimeLaw:
     acceleration = np.diff(found.speed**2) / (2.0 * np.diff(s))
     law = TimeLaw.from_pieces(_durations(s, found.speed), [acceleration / 2.0, found.speed[:-1], s[:-1]])
     return replace(law, iterations=found.solves, residual=found.gain)
