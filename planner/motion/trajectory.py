@@ -197,6 +197,7 @@ def opened(path: str | Path) -> "pa.OSFile":
     """
     import pyarrow as pa
 
+    open(path, "rb").close()  # pyarrow's own words for what is wrong are longer
     return pa.OSFile(os.fsencode(path))
 
 

@@ -89,9 +89,9 @@ def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figu
                 beside = place.with_name(f"{path.stem}-{k}.png")  # moves along
                 beside.write_bytes(png)
                 content += f"\n## {title}\n\n![{title}]({beside.name})\n"
-            place.write_text(f"{content}\n---\n\n{made}\n", encoding="utf-8")
+            place.write_text(f"{content}\n---\n\n{made}\n", encoding="utf-8", errors="backslashreplace")
         elif path.suffix == ".html":
-            place.write_text(_html(path.stem, markdown, drawn, made), encoding="utf-8")
+            place.write_text(_html(path.stem, markdown, drawn, made), encoding="utf-8", errors="backslashreplace")
         else:
             place.write_bytes(_pdf(markdown, drawn, made))
 
