@@ -1,19 +1,25 @@
-"""The description of a move, which Python, the command and mission files share."""
+"""The description of a move, which Python, the command and mission files share.
+
+`MoveSpec` is the move as objects, `MoveWords` the same in words. The options of the command are made from the fields of
+`MoveWords`, so that a new one is described once.
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model import InputError
 from boom_model.arrays import scalar
-from boom_model.kinematics.constraints import Constraint, parse_constraint
+from boom_model.kinematics.constraints import CONSTRAINTS, Constraint, parse_constraint
+from boom_model.plausible import DURATION, RATE, Range
 from planner.motion.trajectory import STEP, check_size
 from planner.motion.vehicle import LEVEL, VehicleCase, load_case
 from planner.paths.legs import Along
-from planner.paths.targets import Target, parse_along, parse_pitch, parse_target
-from planner.timing.profile import Cubic, TimingProfile
+from planner.paths.targets import Target, parse_along, parse_joint_velocity, parse_pitch, parse_target
+from planner.timing.profile import PROFILES, Cubic, TimingProfile, parse_profile
 from planner.timing.timing import Timing
 
 
@@ -112,6 +118,82 @@ class MoveSpec:
     def timing(self) -> Timing:
         """Profile, duration and rate."""
         return Timing(self.profile, self.duration, self.rate)
+
+
+@dataclass(frozen=True)
+class Word:
+    """What people are told of a word of a move: its form, its meaning, and its bounds."""
+
+    help: str
+    form: str | None = None
+    choices: tuple[str, ...] = ()
+    quantity: Range | None = None
+
+
+def _word(
+    default: Any, help: str, form: str | None = None, *, choices: tuple[str, ...] = (), quantity: Range | None = None
+) -> Any:
+    return field(default=default, metadata={"word": Word(help, form, choices, quantity)})
+
+
+@dataclass(frozen=True)
+class MoveWords:
+    """A move in words, as the command's options and a mission's keys give it."""
+
+    start: str
+    goal: str
+    profile: str = _word("cubic", "How the path is timed.", choices=tuple(map(str, PROFILES)))
+    via: tuple[str, ...] = _word((), "A target on the way, with a stop; may be given again.", "TARGET")
+    pass_via: bool = _word(False, "Pass the targets on the way on a smooth path, without a stop.")
+    via_velocity: tuple[str, ...] = _word(
+        (),
+        "The cubic's velocity at each --via, in turn, without a stop; otherwise its acceleration is continuous there.",
+        "DEG/S,DEG/S,DEG/S,M/S,DEG/S",
+    )
+    along: str = _word(
+        "joint",
+        "What goes straight: the joints, or the tip from tip target to tip target; or an arc of the tip through a point.",
+        "joint|line|arc=X,Y,Z",
+    )
+    duration: float | None = _word(None, "Duration; otherwise the least that the limits allow.", "S", quantity=DURATION)
+    jerk_bound: bool = _word(False, "Keep the jerk limits as well (time-optimal profile).")
+    average_torque: bool = _word(False, "Keep the gearboxes' average torque as well (time-optimal profile).")
+    rate: float | None = _word(None, "Sample at a controller's rate; the move ends on its clock.", "HZ", quantity=RATE)
+    pitch: str = _word(
+        "down", "Elevation of the end effector at a tip target; free lets the constraint choose it.", "down|level|up|free|DEG"
+    )
+    constraint: str = _word("horizontal", f"Extra constraint of a tip target: {CONSTRAINTS}.", "CONSTRAINT")
+    vehicle: str | None = _word(
+        None, "What the vehicle does meanwhile: slope, track, shock, ditch or a FILE.toml; otherwise it rests.", "CASE"
+    )
+
+    def spec(self) -> MoveSpec:
+        """Return the move as objects.
+
+        Raises:
+            InputError: a word is not known, a number is malformed or out of range, or options contradict each other.
+        """
+        if self.via_velocity and len(self.via_velocity) != len(self.via):
+            raise InputError(f"{len(self.via_velocity)} --via-velocity for {len(self.via)} --via; give one for each")
+        velocities = [parse_joint_velocity(text) for text in self.via_velocity]
+        return MoveSpec.of(
+            self.start,
+            self.goal,
+            via=self.via,
+            stop_at_via=not self.pass_via,
+            constraint=self.constraint,
+            pitch=self.pitch,
+            along=self.along,
+            profile=parse_profile(
+                self.profile,
+                jerk_bound=self.jerk_bound,
+                average_torque=self.average_torque,
+                velocities=velocities or None,
+            ),
+            duration=self.duration,
+            rate=self.rate,
+            vehicle=LEVEL if self.vehicle is None else self.vehicle,
+        )
 
 
 def _target(target: Target) -> Target:

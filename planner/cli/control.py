@@ -7,38 +7,28 @@ from typing import TYPE_CHECKING
 import click
 
 from boom_model import InputError
-from boom_model.plausible import BANDWIDTH, DAMPING, DURATION, INTEGRAL, PAYLOAD_ERROR, TIP_TOLERANCE
+from boom_model.plausible import BANDWIDTH, DAMPING, INTEGRAL, PAYLOAD_ERROR, TIP_TOLERANCE
 from planner.cli.options import (
+    all_option,
     boom_option,
-    hold_option,
     json_option,
     load_boom,
+    load_vehicle,
+    move_options,
     outputs,
     payload_option,
-    pitch_option,
     plausible,
     report_option,
-    vehicle_option,
 )
-from planner.cli.printing import (
-    ANSWER_IS_NO,
-    STYLES,
-    complain,
-    new_console,
-    new_table,
-    print_files,
-    print_json,
-    print_lines,
-    tracked,
-)
+from planner.cli.printing import ANSWER_IS_NO, STYLES, complain, print_files, print_json, print_lines, print_rows, tracked
+from planner.move_spec import MoveWords
 
 if TYPE_CHECKING:
     from planner.control.study import Study
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
-@click.argument("start")
-@click.argument("goal")
+@move_options("profile", "via_velocity", "average_torque", "rate")
 @click.option(
     "--profile", "profiles", default="cubic", show_default=True, metavar="NAME,...|all", help="Profiles as in `boom plan`."
 )
@@ -50,10 +40,6 @@ if TYPE_CHECKING:
     "--shaper", "shapers", default="none", show_default=True, metavar="NAME,...|all",
     help="none, zv, zvd: impulses that cancel the lowest mode, for half a period or a whole one.",
 )  # fmt: skip
-@click.option("--via", multiple=True, metavar="TARGET", help="As in `boom plan`; may be given again.")
-@click.option("--pass-via", is_flag=True, help="As in `boom plan`.")
-@click.option("--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z", help="As in `boom plan`.")
-@click.option("--jerk-bound", is_flag=True, help="As in `boom plan`.")
 @click.option(
     "--bandwidth",
     default=6.0,
@@ -72,9 +58,6 @@ if TYPE_CHECKING:
     show_default=True,
     help="Integral action's pole, as a share of the bandwidth.",
 )
-@click.option("--duration", type=float, callback=plausible(DURATION), metavar="S", help="As in `boom plan`.")
-@pitch_option
-@hold_option
 @payload_option
 @click.option(
     "--payload-error",
@@ -108,25 +91,17 @@ if TYPE_CHECKING:
 @click.option("--loops", metavar="FILE.png", help="Bode diagrams and poles as a picture.")
 @click.option("--errors", metavar="FILE.png", help="The tip's errors as a picture.")
 @report_option
-@vehicle_option
 @boom_option
+@all_option
 @json_option
 def control(
-    start: str,
-    goal: str,
+    move: MoveWords,
     profiles: str,
     controllers: str,
     shapers: str,
-    via: tuple[str, ...],
-    pass_via: bool,
-    along: str,
-    jerk_bound: bool,
     bandwidth: float,
     damping: float,
     integral: float,
-    duration: float | None,
-    pitch: str,
-    hold: str,
     payload: float | None,
     payload_error: float,
     gust: str | None,
@@ -140,8 +115,8 @@ def control(
     loops: str | None,
     errors: str | None,
     document: str | None,
-    vehicle: str | None,
     boom_file: str | None,
+    whole: bool,
     as_json: bool,
 ) -> int:
     """Follow a planned move in closed loop: design, margins, simulation of the full model, and how far off the tip is.
@@ -160,12 +135,10 @@ def control(
     from planner.control.plant import Plant
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
-    from planner.motion.vehicle import LEVEL, load_case
-    from planner.move_spec import MoveSpec
     from planner.planning import plan_move
-    from planner.timing.profile import Profile, parse_profile
+    from planner.timing.profile import Profile
 
-    boom, case = load_boom(boom_file, payload), None if vehicle is None else load_case(vehicle)
+    boom, case = load_boom(boom_file, payload), None if move.vehicle is None else load_vehicle(move.vehicle)
     setup = Setup(
         goals=Goals.of(bandwidth, damping, integral),
         figures=parse_figures(figures),
@@ -187,23 +160,9 @@ def control(
             raise InputError(f"{name}: a picture is written as .png")
     if loops is not None and chosen[0] == [Controller.STEPPER]:
         raise InputError("a stepper runs open loop: there is no Bode diagram of it")
-    files = outputs(out, loops, errors, document=document, inputs=(boom_file, vehicle))
-    specs = [
-        MoveSpec.of(
-            start,
-            goal,
-            profile=parse_profile(profile, jerk_bound=jerk_bound),
-            duration=duration,
-            pitch=pitch,
-            constraint=hold,
-            via=via,
-            stop_at_via=not pass_via,
-            along=along,
-            vehicle=LEVEL if case is None else case,
-        )
-        for profile in _several("profile", profiles, list(Profile))
-    ]
-    moves = [plan_move(boom, spec) for spec in specs]
+    files = outputs(out, loops, errors, document=document, inputs=(boom_file, move.vehicle))
+    words = _several("profile", profiles, list(Profile))
+    moves = [plan_move(boom, replace(move, profile=word).spec()) for word in words]
     names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
     found = study(boom, moves, *names, setup, tracked("simulating"))
     if left_out:
@@ -228,33 +187,36 @@ def control(
 
             write_document(files.temporary(document), found.to_markdown(), study_pictures(found))
             written["report"] = document
-    return _print_study(found, written, as_json)
+    return _print_study(found, written, as_json, whole)
 
 
-def _print_study(study: "Study", written: dict[str, str], as_json: bool) -> int:
+def _print_study(study: "Study", written: dict[str, str], as_json: bool, whole: bool) -> int:
     from planner.control.study import LOOP_HEADER, ROW_HEADER, ROW_LEGEND, loop_cells, row_cells
 
     if as_json:
         print_json(study.to_json(written))
         return _code(study)
-    console = new_console()
-    table = new_table(*ROW_HEADER)
-    for row in study.rows:
-        table.add_row(*row_cells(row), style=STYLES.get(row.outcome))
-    console.print(table)
-    console.print(ROW_LEGEND, highlight=False)
-    if study.designs:
-        console.print("Loops at the goal, each joint's broken with the others closed", highlight=False)
-        table = new_table(*LOOP_HEADER)
-        for design in study.designs:
-            for i, cells in enumerate(loop_cells(design)):
-                table.add_row(*cells, end_section=i == 4)
-        console.print(table)
-    print_lines("Case", study.reasons)
-    print_lines("Note", study.notes)
-    print_lines("Assumed", study.assumptions)
-    console.print(study.modes_sentence, highlight=False, soft_wrap=True)
-    console.print(study.summary, style="bold red" if study.failed else None, highlight=False, soft_wrap=True)
+    print_lines(None, [study.summary, study.modes_sentence])
+    listed = study.rows if whole else study.leading
+    cells = [row_cells(row) for row in listed]
+    print_rows(
+        ROW_HEADER,
+        cells,
+        drop=("over", "rest mm", "settles s", "time s"),
+        styles=[STYLES.get(row.outcome) for row in listed],
+    )
+    if whole:
+        print_lines(None, [ROW_LEGEND])
+        if study.designs:
+            click.echo("Loops at the goal, each joint's broken with the others closed")
+            print_rows(LOOP_HEADER, [cells for design in study.designs for cells in loop_cells(design)])
+        print_lines("case", study.reasons)
+        print_lines("note", study.notes)
+        print_lines("assumed", study.assumptions)
+    else:
+        print_lines(
+            None, [f"{len(listed)} of {len(study.rows)} cases, {len(study.assumptions)} assumed figures: --all lists them"]
+        )
     print_files(written)
     return _code(study)
 

@@ -7,6 +7,7 @@ import click
 from boom_model import InfeasibleError, InputError
 from boom_model.plausible import VOLTAGE
 from planner.cli.options import (
+    all_option,
     boom_option,
     check_picture,
     given_catalogue,
@@ -33,6 +34,7 @@ from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json
 @report_option
 @picture_option
 @boom_option
+@all_option
 @json_option
 def mission(
     missions: tuple[str, ...],
@@ -43,6 +45,7 @@ def mission(
     picture: str | None,
     document: str | None,
     boom_file: str | None,
+    whole: bool,
     as_json: bool,
 ) -> int:
     """Check a duty cycle of moves, holds and pauses as a whole; several of them side by side.
@@ -57,9 +60,10 @@ def mission(
     from planner.checks.rows import Verdict
     from planner.missions.mission import check_cycle, load_mission, plan_cycle
     from planner.planning import torques
+    from planner.reports.answer import answer
     from planner.reports.document import write_document
     from planner.reports.drive_pictures import drive_pages, write_drive_picture
-    from planner.reports.side_by_side import compared, side_by_side_markdown
+    from planner.reports.side_by_side import compared, loads_side_by_side, side_by_side_markdown
 
     boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
     check_picture(picture)
@@ -93,13 +97,19 @@ def mission(
             write_drive_picture(files.temporary(picture), *next(iter(drawn.values())))
             written["picture"] = picture
     if alone:
-        return print_report(next(iter(reports.values())), written, as_json)
+        ((name, report),) = reports.items()
+        asked = f"mission {name}, {report.duration:.0f} s, payload {boom.payload.mass:g} kg"
+        return print_report(report, asked, written, as_json, whole, f"boom size {missions[0]}")
     if as_json:
         print_json({"missions": {name: report.to_json({}) for name, report in reports.items()}, "files": written})
     else:
-        print_rows(header, rows)
         for name, report in reports.items():
-            print_lines(f"{name}", (report.summary,))
+            print_lines(name, (answer(report).sentence,))
+        if whole or joints:
+            print_rows(header, rows)
+        else:
+            print_rows(("joint", *reports), loads_side_by_side(reports))
+            print_lines(None, [f"{len(rows)} checks: --all lists them side by side"])
         print_files(written)
     failed = [f"{name}: a check FAILs" for name, report in reports.items() if report.verdict is Verdict.FAIL]
     if failed:
@@ -132,6 +142,7 @@ def mission(
 @vehicle_option
 @report_option
 @boom_option
+@all_option
 @json_option
 def size(
     mission: str,
@@ -144,6 +155,7 @@ def size(
     vehicle: str | None,
     document: str | None,
     boom_file: str | None,
+    whole: bool,
     as_json: bool,
 ) -> int:
     """Go through the catalogue for each joint: what does not fail, ranked by mass and margin, and why the rest does.
@@ -186,16 +198,27 @@ def size(
     if as_json:
         print_json(sizing_json(asked.name, choices, notes) | {"files": written})
     else:
-        for choice in (choice for choice in choices if choice.judged):
-            click.echo(f"{choice.joint}, {choice.variant}")
-            print_rows(*ranking(choice))
-            print_lines("No motion with", no_motion(choice))
-            print_lines("All are warned of", choice.warned)
-        click.echo("Each drive in its best supply")
-        print_rows(*motors(choices))
-        click.echo("What the lightest saves")
+        print_lines(None, [f"mission {asked.name}, payload {boom.payload.mass:g} kg"])
         print_rows(SAVING, saving(choices))
-        print_lines("Note", notes)
+        if whole:
+            for choice in (choice for choice in choices if choice.judged):
+                print_lines(None, [f"{choice.joint}, {choice.variant}"])
+                print_rows(*ranking(choice), drop=("warnings", "moving", "mass"))
+                print_lines("no motion with", no_motion(choice))
+                print_lines("every drive has these warnings", choice.warned)
+            print_lines(None, ["each drive in its best supply"])
+            print_rows(*motors(choices))
+            print_lines("note", notes)
+        else:
+            print_lines(
+                "not checked",
+                (
+                    text.partition(": NOT CHECKED, ")[0::2][0] + ": " + text.partition(": NOT CHECKED, ")[2]
+                    for text in notes
+                    if ": NOT CHECKED, " in text
+                ),
+            )
+            print_lines(None, [f"{len(notes)} notes, every drive ranked: --all lists them"])
         print_files(written)
     unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]
     if unmet:

@@ -7,8 +7,8 @@ import numpy as np
 
 from boom_model import InfeasibleError, InputError, inverse_kinematics
 from boom_model.kinematics.constraints import parse_constraint
-from planner.cli.options import boom_option, hold_option, json_option, load_boom, outputs, payload_option, pitch_option
-from planner.cli.printing import new_console, new_table, print_files, print_json
+from planner.cli.options import boom_option, constraint_option, json_option, load_boom, outputs, payload_option, pitch_option
+from planner.cli.printing import print_files, print_json, print_lines, print_rows
 from planner.paths.targets import parse_pitch, unreachable
 
 
@@ -17,24 +17,26 @@ from planner.paths.targets import parse_pitch, unreachable
 @click.argument("y", type=float)
 @click.argument("z", type=float)
 @pitch_option
-@hold_option
+@constraint_option
 @payload_option
 @boom_option
 @json_option
-def ik(x: float, y: float, z: float, pitch: str, hold: str, payload: float | None, boom_file: str | None, as_json: bool) -> int:
-    """Every joint position that puts the tip at X Y Z (m, in the base frame).
+def ik(
+    x: float, y: float, z: float, pitch: str, constraint: str, payload: float | None, boom_file: str | None, as_json: bool
+) -> int:
+    """List every joint position that puts the tip at X Y Z (m, in the base frame).
 
     \b
     Example:
-      boom ik 1.4 0 1.0 --pitch down --hold extension=0.25
+      boom ik 1.4 0 1.0 --pitch down --constraint extension=0.25
     """
     boom = load_boom(boom_file, payload)
-    angle, held, position = parse_pitch(pitch), parse_constraint(hold), (x, y, z)
-    found = inverse_kinematics(boom, position, angle, held)
-    reason = None if found.best is not None else unreachable(boom, position, angle, held)
+    angle, chosen, position = parse_pitch(pitch), parse_constraint(constraint), (x, y, z)
+    found = inverse_kinematics(boom, position, angle, chosen)
+    reason = None if found.best is not None else unreachable(boom, position, angle, chosen)
     if as_json:
         answer: dict[str, Any] = {
-            "target": {"position_m": position, "pitch_rad": found.pitch, "hold": str(held)},
+            "target": {"position_m": position, "pitch_rad": found.pitch, "hold": str(chosen)},
             "solutions": [
                 {"q": s.q.tolist(), "within_limits": s.within_limits, "reasons": list(s.reasons)} for s in found.solutions
             ],
@@ -42,17 +44,14 @@ def ik(x: float, y: float, z: float, pitch: str, hold: str, payload: float | Non
         }
         print_json(answer if reason is None else answer | {"reason": reason})
     elif found.solutions:
-        table = new_table("branch", "yaw deg", "inner deg", "lower deg", "extension m", "wrist deg", "within limits", "reasons")
+        rows, broken = [], []
         for i, s in enumerate(found.solutions):
             q = np.where([0, 0, 0, 1, 0], s.q, np.degrees(s.q))
             best = " (best)" if i == found.best else ""
-            table.add_row(
-                f"{i + 1}{best}",
-                *(f"{v:.4f}" for v in q),
-                "yes" if s.within_limits else "no",
-                "\n".join(s.reasons) or "-",
-            )
-        new_console().print(table)
+            rows.append((f"{i + 1}{best}", *(f"{v:.4f}" for v in q), "yes" if s.within_limits else "no"))
+            broken += [f"branch {i + 1}: {text}" for text in s.reasons]
+        print_rows(("branch", "yaw deg", "inner deg", "lower deg", "extension m", "wrist deg", "in limits"), rows)
+        print_lines(None, broken)
     if reason is not None:
         raise InfeasibleError(reason)
     return 0
@@ -60,30 +59,30 @@ def ik(x: float, y: float, z: float, pitch: str, hold: str, payload: float | Non
 
 @click.command()
 @pitch_option
-@hold_option
+@constraint_option
 @payload_option
 @click.option("--out", default="reach.png", show_default=True, metavar="FILE.png|FILE.rrd", help="The picture or recording.")
 @boom_option
 @json_option
-def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str | None, as_json: bool) -> int:
-    """What the tip reaches in the arm's vertical plane, and with what torque to spare.
+def reach(pitch: str, constraint: str, payload: float | None, out: str, boom_file: str | None, as_json: bool) -> int:
+    """Draw the workspace in the arm's vertical plane, coloured by torque margin.
 
     \b
     Example:
-      boom reach --hold least-torque --payload 8 --out reach.png
+      boom reach --constraint least-torque --payload 8 --out reach.png
     """
     from boom_model.kinematics.reach import reach_map
 
     if not out.endswith((".png", ".rrd")):
         raise InputError(f"{out}: a reach map is written as .png or .rrd")
-    boom, angle, held = load_boom(boom_file, payload), parse_pitch(pitch), parse_constraint(hold)
+    boom, angle, chosen = load_boom(boom_file, payload), parse_pitch(pitch), parse_constraint(constraint)
     if angle is None:
         raise InputError("pitch free: a reach map is drawn for one pitch")
     files = outputs(out, inputs=(boom_file,))
-    found = reach_map(boom, held, angle)
+    found = reach_map(boom, chosen, angle)
     row, column = np.nonzero(found.within_limits)
     answer: dict[str, Any] = {
-        "hold": str(held),
+        "hold": str(chosen),
         "pitch_rad": angle,
         "payload_kg": boom.payload.mass,
         "cells": found.exists.size,
@@ -93,7 +92,7 @@ def reach(pitch: str, hold: str, payload: float | None, out: str, boom_file: str
         "files": {},
     }
     if not len(row):
-        reason = f"no tip position with pitch {np.degrees(angle):.4g} deg and hold {held} is within the limits"
+        reason = f"no tip position with pitch {np.degrees(angle):.4g} deg and constraint {chosen} is within the limits"
         if as_json:
             print_json(answer | {"reason": reason})
         raise InfeasibleError(reason)

@@ -7,93 +7,51 @@ import click
 import numpy as np
 
 from boom_model import Boom, InfeasibleError, InputError
-from boom_model.plausible import DURATION, RATE
 from planner.cli.options import (
+    all_option,
     boom_option,
     check_picture,
-    hold_option,
     json_option,
     load_boom,
     load_vehicle,
+    move_options,
     outputs,
     payload_as_option,
     payload_option,
     picture_option,
-    pitch_option,
-    plausible,
     report_option,
     vehicle_option,
 )
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
-from planner.paths.targets import parse_joint_velocity, parse_pitch
+from planner.move_spec import MoveSpec, MoveWords
 
 if TYPE_CHECKING:
-    from boom_model.arrays import Array
     from planner.files import Outputs
-    from planner.motion.trajectory import Trajectory
+    from planner.planning import Move
     from planner.reports.report import Report
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -0.5 is a number
-@click.argument("start")
-@click.argument("goal")
-@click.option(
-    "--profile", type=click.Choice(["cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal"]), default="cubic",
-    show_default=True, help="How the path is timed.",
-)  # fmt: skip
-@click.option("--via", multiple=True, metavar="TARGET", help="A target on the way, with a stop; may be given again.")
-@click.option("--pass-via", is_flag=True, help="Go through the targets on the way on a smooth path, without a stop.")
-@click.option(
-    "--via-velocity", multiple=True, metavar="DEG/S,DEG/S,DEG/S,M/S,DEG/S",
-    help="The cubic's velocity at each --via, in turn, without a stop; else its acceleration is continuous there.",
-)  # fmt: skip
-@click.option(
-    "--along", default="joint", show_default=True, metavar="joint|line|arc=X,Y,Z",
-    help="What goes straight: the joints, or the tip from tip target to tip target; or an arc of the tip through a point.",
-)  # fmt: skip
-@click.option("--duration", type=float, callback=plausible(DURATION), metavar="S", help="Else the least that the limits allow.")
-@click.option("--jerk-bound", is_flag=True, help="Hold the time-optimal profile to the jerk limits as well.")
-@click.option("--average-torque", is_flag=True, help="Hold the time-optimal profile to the gearboxes' average torque as well.")
-@click.option(
-    "--rate",
-    type=float,
-    callback=plausible(RATE),
-    metavar="HZ",
-    help="Sample at a controller's rate; the move ends on its clock.",
-)
-@pitch_option
-@hold_option
+@move_options()
 @payload_option
 @click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
 @click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
 @report_option
 @picture_option
-@vehicle_option
-@click.option("--show-reach", is_flag=True, help="Draw in the recording what the tip reaches under --pitch and --hold.")
+@click.option("--show-reach", is_flag=True, help="Draw the workspace under --pitch and --constraint in the recording.")
 @boom_option
+@all_option
 @json_option
 def plan(
-    start: str,
-    goal: str,
-    profile: str,
-    via: tuple[str, ...],
-    pass_via: bool,
-    via_velocity: tuple[str, ...],
-    along: str,
-    duration: float | None,
-    jerk_bound: bool,
-    average_torque: bool,
-    rate: float | None,
-    pitch: str,
-    hold: str,
+    move: MoveWords,
     payload: float | None,
     out: str,
     csv_file: str | None,
     picture: str | None,
     document: str | None,
-    vehicle: str | None,
     show_reach: bool,
     boom_file: str | None,
+    whole: bool,
     as_json: bool,
 ) -> int:
     """Plan a move, check it against limits and drives, and record it.
@@ -104,124 +62,120 @@ def plan(
     \b
     Examples:
       boom plan transport phenotyping
-      boom plan transport tip=1.4,0,1.0 --hold extension=0.25 --profile time-optimal
+      boom plan transport tip=1.4,0,1.0 --constraint extension=0.25 --profile time-optimal
       boom plan tip=1,1.7,0.9 tip=-1,1.7,0.9 --along line --profile jerk-limited
       boom plan transport phenotyping --via q=40,60,120,0.3,0 --pass-via --profile time-optimal --jerk-bound --rate 250
     """
-    from planner.motion.trajectory import write_csv
-    from planner.move_spec import MoveSpec
-    from planner.planning import plan_move
-    from planner.suggestions import suggestions
-    from planner.timing.profile import parse_profile
-
-    boom = load_boom(boom_file, payload)
-    case = load_vehicle(vehicle)
     check_picture(picture)
-    files = outputs(out, csv_file, picture, document=document, inputs=(boom_file, vehicle))
-    elevation = parse_pitch(pitch)
-    if show_reach and elevation is None:
-        raise InputError("pitch free: the reach is drawn for one pitch")
-    velocities = [parse_joint_velocity(text) for text in via_velocity]
-    if velocities and len(velocities) != len(via):
-        raise InputError(f"{len(velocities)} --via-velocity for {len(via)} --via; give one for each")
-    spec = MoveSpec.of(
-        start,
-        goal,
-        profile=parse_profile(profile, jerk_bound=jerk_bound, average_torque=average_torque, velocities=velocities or None),
-        duration=duration,
-        pitch=pitch,
-        constraint=hold,
-        via=via,
-        stop_at_via=not pass_via,
-        along=along,
-        vehicle=case,
-        rate=rate,
-    )
-    track = tracked("looking for what would mend it")
-    try:
-        move = plan_move(boom, spec)
-    except InfeasibleError as error:
-        mend = [each.sentence for each in suggestions(boom, spec, track)]
-        if as_json:
-            failed: dict[str, Any] = {"profile": profile, "duration_s": None, "verdict": "FAIL", "checks": [], "files": {}}
-            print_json({**failed, "reason": str(error), "remedies": mend})
-        print_lines("Would mend it" if not as_json else None, mend)
-        raise
-    report = move.full_report
+    files = outputs(out, csv_file, picture, document=document, inputs=(boom_file, move.vehicle))
+    boom, spec = load_boom(boom_file, payload), move.spec()
+    if show_reach and spec.pitch is None:
+        raise InputError("pitch free: the workspace is drawn for one pitch")
+    planned = _planned(boom, spec, as_json)
+    report = planned.full_report if whole or as_json or document is not None else planned.report
     if report.verdict == "FAIL":
-        report = replace(report, suggestions=tuple(each.sentence for each in suggestions(boom, spec, track)))
-    from planner.recording import write_recording
+        report = replace(report, suggestions=_fixes(boom, spec))
+    written = {"recording": out, "csv": csv_file, "picture": picture, "report": document}
+    _write(files, planned, report, written, spec if show_reach else None)
+    asked = f"{move.start} to {move.goal}, {report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg"
+    return print_report(report, asked, _given(written, files), as_json, whole, f"boom view {out}")
 
-    reach = None
-    if show_reach and elevation is not None:
-        from boom_model.kinematics.reach import reach_map
 
-        reach = reach_map(boom, spec.constraint, elevation)
-    written = {"recording": out}
+def _planned(boom: Boom, spec: MoveSpec, as_json: bool) -> "Move":
+    """The planned move; where there is none, the changes that would make it possible are printed first."""
+    from planner.planning import plan_move
+
+    try:
+        return plan_move(boom, spec)
+    except InfeasibleError as error:
+        fixes = _fixes(boom, spec)
+        if as_json:
+            failed: dict[str, Any] = {"profile": str(spec.profile), "duration_s": None, "verdict": "FAIL", "checks": []}
+            print_json({**failed, "files": {}, "reason": str(error), "remedies": fixes})
+        else:
+            print_lines("possible fix", fixes)
+        raise
+
+
+def _fixes(boom: Boom, spec: MoveSpec) -> tuple[str, ...]:
+    from planner.suggestions import suggestions
+
+    return tuple(each.sentence for each in suggestions(boom, spec, tracked("looking for possible fixes")))
+
+
+def _write(
+    files: "Outputs", move: "Move", report: "Report", written: dict[str, str | None], workspace: MoveSpec | None = None
+) -> None:
+    """Write the files of a move that have a name; with the workspace of a description, it is in the recording."""
+    from planner.motion.trajectory import write_csv
+
+    recording, csv_file, picture, document = (written.get(kind) for kind in ("recording", "csv", "picture", "report"))
+    shown = (move.boom, move.trajectory)
     with files:
-        write_recording(files.temporary(out), move, reach=reach)
+        if recording is not None:
+            from planner.recording import write_recording
+
+            write_recording(files.temporary(recording), move, reach=_workspace(move.boom, workspace))
         if csv_file is not None:
             write_csv(move.trajectory, files.temporary(csv_file), move.loads.tau)
-            written["csv"] = csv_file
         if picture is not None:
             from planner.reports.drive_pictures import write_drive_picture
 
-            write_drive_picture(files.temporary(picture), boom, move.trajectory, move.loads.tau, report)
-            written["picture"] = picture
-        _write_report(files, document, report, boom, move.trajectory, move.loads.tau, written)
-    return print_report(report, written, as_json)
+            write_drive_picture(files.temporary(picture), *shown, move.loads.tau, report)
+        if document is not None:
+            from planner.reports.document import write_document
+            from planner.reports.drive_pictures import drive_pages
+            from planner.reports.move_pictures import move_pictures
+
+            pages = move_pictures(*shown, move.loads.tau) | drive_pages(*shown, move.loads.tau, report)
+            write_document(files.temporary(document), report.to_markdown(), pages)
+
+
+def _workspace(boom: Boom, spec: MoveSpec | None) -> Any:
+    if spec is None or spec.pitch is None:
+        return None
+    from boom_model.kinematics.reach import reach_map
+
+    return reach_map(boom, spec.constraint, spec.pitch)
+
+
+def _given(written: dict[str, str | None], files: "Outputs") -> dict[str, str]:
+    return {kind: name for kind, name in written.items() if name is not None}
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
-@click.argument("start")
-@click.argument("goal")
-@click.option("--via", multiple=True, metavar="TARGET", help="A target on the way, with a stop; may be given again.")
-@click.option("--pass-via", is_flag=True, help="Go through the targets on the way on a smooth path, without a stop.")
-@pitch_option
-@hold_option
+@move_options("profile", "via_velocity", "along", "duration", "jerk_bound", "average_torque", "rate", "vehicle")
 @payload_option
 @click.option("--out", metavar="FILE.rrd", help="A recording of all of them over each other, for `boom view`.")
 @boom_option
 @json_option
-def profiles(
-    start: str,
-    goal: str,
-    via: tuple[str, ...],
-    pass_via: bool,
-    pitch: str,
-    hold: str,
-    payload: float | None,
-    out: str | None,
-    boom_file: str | None,
-    as_json: bool,
-) -> int:
-    """Every profile on one move, side by side: duration, worst ratio to each limit, worst stop.
+def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file: str | None, as_json: bool) -> int:
+    """Compare every profile on one move: verdict, duration, ratio to each limit, worst stop.
 
     \b
     Example:
       boom profiles transport phenotyping --payload 20 --out profiles.rrd
     """
-    from planner.move_spec import MoveSpec
     from planner.profile_table import HEADER, cells, profile_markdown, profile_moves, profile_rows
 
-    files = outputs(out, inputs=(boom_file,))
-    spec = MoveSpec.of(start, goal, via=via, stop_at_via=not pass_via, pitch=pitch, constraint=hold)
-    moves, refused = profile_moves(load_boom(boom_file, payload), spec, tracked("planning with each profile"))
+    files, boom = outputs(out, inputs=(boom_file,)), load_boom(boom_file, payload)
+    moves, refused = profile_moves(boom, move.spec(), tracked("planning with each profile"))
     rows = profile_rows(moves)
-    written: dict[str, str] = {}
+    written = {} if out is None else {"recording": out}
     if out is not None:
         from planner.recording import write_moves_recording
 
         with files:
             write_moves_recording(files.temporary(out), moves, profile_markdown(rows))
-        written["recording"] = out
+    failed = [f"{row.profile}: a check FAILs" for row in rows if row.verdict == "FAIL"]
+    failed += [f"{name}: {reason}" for name, reason in refused.items()]
     if as_json:
         print_json({"profiles": [asdict(row) for row in rows], "refused": refused, "files": written})
     else:
-        print_rows(HEADER, map(cells, rows))
+        click.echo(f"{move.start} to {move.goal}, payload {boom.payload.mass:g} kg; each ratio is demand / limit")
+        print_rows(HEADER, map(cells, rows), drop=("motor speed", "acceleration", "velocity", "jerk"))
+        print_lines("refused", (f"{name}: {reason}" for name, reason in refused.items()))
         print_files(written)
-    failed = [f"{row.profile}: a check FAILs" for row in rows if row.verdict == "FAIL"]
-    failed += [f"{name}: {reason}" for name, reason in refused.items()]
     if failed:
         complain("; ".join(failed))
     return ANSWER_IS_NO if failed else 0
@@ -235,7 +189,7 @@ def profiles(
 @boom_option
 @json_option
 def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
-    """Inverse dynamics of a motion: the torque of each joint at each sample, with its friction where the boom's file gives it.
+    """Compute the torque of each joint at each sample of a motion, with friction where the boom's file gives it.
 
     IN is a CSV or Parquet file that holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
 
@@ -247,8 +201,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
     from planner.motion.motion_files import form_of, read_motion, write_motion
     from planner.planning import torques
 
-    form = form_of(out)
-    files = outputs(out, inputs=(motion, boom_file))
+    form, files = form_of(out), outputs(out, inputs=(motion, boom_file))
     boom, trajectory = load_boom(boom_file, payload), read_motion(motion)
     tau = torques(boom, trajectory, payload_as)
     with files:
@@ -261,12 +214,10 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
     if as_json:
         print_json({"peaks": peaks, "notes": list(trajectory.notes), "files": {form[1:]: out}})
         return 0
-    print_rows(
-        ("joint", "peak", "at"),
-        [(str(peak["joint"]), f"{peak['tau']:.3f} {peak['unit']}", f"{peak['at_s']:.3f} s") for peak in peaks],
-    )
-    print_lines("Note", trajectory.notes)
-    click.echo(f"{form[1:]}: {out}")
+    shown = [(str(peak["joint"]), f"{peak['tau']:.3f} {peak['unit']}", f"{peak['at_s']:.3f} s") for peak in peaks]
+    print_rows(("joint", "largest load", "at"), shown)
+    print_lines("note", trajectory.notes)
+    print_files({form[1:]: out})
     return 0
 
 
@@ -279,6 +230,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 @report_option
 @picture_option
 @boom_option
+@all_option
 @json_option
 def check(
     motion: str,
@@ -289,9 +241,10 @@ def check(
     picture: str | None,
     document: str | None,
     boom_file: str | None,
+    whole: bool,
     as_json: bool,
 ) -> int:
-    """Hold any motion against the joint limits and the drives' datasheets. IN is a CSV or Parquet file.
+    """Check any motion against the joint limits and the drives' datasheets. IN is a CSV or Parquet file.
 
     \b
     Example:
@@ -303,41 +256,10 @@ def check(
 
     check_picture(picture)
     files = outputs(out, picture, document=document, inputs=(motion, boom_file, vehicle))
-    boom, trajectory = load_boom(boom_file, payload), read_motion(motion)
-    move = examine(boom, trajectory, payload_as=payload_as, vehicle=load_vehicle(vehicle))
-    written: dict[str, str] = {}
-    with files:
-        if out is not None:
-            from planner.recording import write_recording
-
-            write_recording(files.temporary(out), move)
-            written["recording"] = out
-        _write_report(files, document, move.report, boom, trajectory, move.loads.tau, written)
-        if picture is not None:
-            from planner.reports.drive_pictures import write_drive_picture
-
-            write_drive_picture(files.temporary(picture), boom, trajectory, move.loads.tau, move.report)
-            written["picture"] = picture
-    return print_report(move.report, written, as_json)
-
-
-def _write_report(
-    files: "Outputs",
-    document: str | None,
-    report: "Report",
-    boom: Boom,
-    motion: "Trajectory",
-    tau: "Array",
-    written: dict[str, str],
-) -> None:
-    from planner.reports.document import write_document
-    from planner.reports.drive_pictures import drive_pages
-    from planner.reports.move_pictures import move_pictures
-
-    if document is not None:
-        write_document(
-            files.temporary(document),
-            report.to_markdown(),
-            move_pictures(boom, motion, tau) | drive_pages(boom, motion, tau, report),
-        )
-        written["report"] = document
+    boom = load_boom(boom_file, payload)
+    move = examine(boom, read_motion(motion), payload_as=payload_as, vehicle=load_vehicle(vehicle))
+    written = {"recording": out, "picture": picture, "report": document}
+    _write(files, move, move.report, written)
+    asked = f"{motion}, {move.report.duration:.3f} s, payload {boom.payload.mass:g} kg"
+    then = f"boom check {motion} --out checked.rrd" if out is None else f"boom view {out}"
+    return print_report(move.report, asked, _given(written, files), as_json, whole, then)

@@ -1,21 +1,76 @@
 """Options that several commands share, and what they stand for."""
 
 from collections.abc import Callable, Iterable
+from dataclasses import MISSING, fields
+from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from boom_model import Boom, InputError
-from boom_model.kinematics.constraints import CONSTRAINTS
 from boom_model.plausible import Range
+from planner.move_spec import MoveWords, Word
 
 if TYPE_CHECKING:
     from planner.files import Outputs
     from planner.motion.vehicle import VehicleCase
 
 _CATALOGUE = "boom.catalogue"
+_Command = Callable[..., Any]
 
-_boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; else the third generation.")
+
+def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any], Any]:
+    """Return a callback that refuses an option's number beyond the bounds of a quantity; None passes."""
+
+    def within(_: click.Context, parameter: click.Parameter, value: Any) -> Any:
+        if value is not None:
+            quantity.require(str(parameter.name).replace("_", "-"), value)
+        return value
+
+    return within
+
+
+_WORDS = {field.name: field for field in fields(MoveWords) if "word" in field.metadata}
+
+
+def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -> Callable[[_Command], _Command]:
+    """Return the option of a field of `MoveWords`, by the field's own description."""
+    field = _WORDS[name]
+    word: Word = field.metadata["word"]
+    standard = field.default if default is MISSING else default
+    kinds: dict[str, Any] = {"default": standard, "help": help or word.help}
+    if isinstance(field.default, bool):
+        kinds |= {"is_flag": True}
+    elif isinstance(field.default, tuple):
+        kinds |= {"multiple": True, "metavar": word.form}
+    elif word.quantity is not None:
+        kinds |= {"type": float, "callback": plausible(word.quantity), "metavar": word.form}
+    elif word.choices:
+        kinds |= {"type": click.Choice(word.choices), "show_default": True}
+    else:
+        kinds |= {"metavar": word.form, "show_default": standard is not None}
+    return click.option(f"--{name.replace('_', '-')}", **kinds)
+
+
+def move_options(*left_out: str) -> Callable[[_Command], _Command]:
+    """Give a command START, GOAL and every option of a move but those left out; it gets them as `move: MoveWords`."""
+    names = [name for name in _WORDS if name not in left_out]
+
+    def decorate(command: _Command) -> _Command:
+        @wraps(command)
+        def run(start: str, goal: str, **given: Any) -> Any:
+            words = {name: given.pop(name) for name in names}
+            return command(move=MoveWords(start, goal, **words), **given)
+
+        decorated: _Command = run
+        for name in reversed(names):
+            decorated = word_option(name)(decorated)
+        return click.argument("start")(click.argument("goal")(decorated))
+
+    return decorate
+
+
+_boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; otherwise the shipped one.")
 _catalogue_option = click.option(
     "--catalogue",
     metavar="FILE.toml",
@@ -25,80 +80,54 @@ _catalogue_option = click.option(
 )
 
 
-def boom_option(command: Callable[..., Any]) -> Callable[..., Any]:
-    """--boom, and --catalogue, which `load_boom` finds in the context: whoever names a drive may have brought it."""
+def boom_option(command: _Command) -> _Command:
+    """Add --boom, and --catalogue, which `load_boom` finds in the context: whoever names a drive may have brought it."""
     return _boom_option(_catalogue_option(command))
 
 
-def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any], Any]:
-    """Callback of an option whose number must be within the bounds of a quantity; None passes."""
-
-    def held(_: click.Context, parameter: click.Parameter, value: Any) -> Any:
-        if value is not None:
-            quantity.require(str(parameter.name).replace("_", "-"), value)
-        return value
-
-    return held
-
-
-payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; else the boom's own.")
+payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; otherwise the boom's own.")
 payload_as_option = click.option(
     "--payload-as", type=click.Choice(["mass", "force"]), default="mass", show_default=True,
-    help="Accelerate the payload with the tip, or hang its weight there and leave out its inertia, as the thesis does.",
+    help="Accelerate the payload with the tip, or only hang its weight there, as the thesis does.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
+all_option = click.option("--all", "whole", is_flag=True, help="Every row, every assumption and every note.")
 report_option = click.option(
     "--report", "document", metavar="FILE.md|.html|.pdf", help="The report as a document, with pictures, versions and command."
 )
-vehicle_option = click.option(
-    "--vehicle",
-    metavar="CASE",
-    help="What the vehicle does meanwhile: slope, track, shock, ditch or a FILE.toml; else it rests.",
-)
+vehicle_option = word_option("vehicle")
+pitch_option = word_option("pitch")
+constraint_option = word_option("constraint")
 picture_option = click.option("--picture", metavar="FILE.png", help="The drives as a page of pictures.")
-pitch_option = click.option(
-    "--pitch",
-    default="down",
-    show_default=True,
-    metavar="down|level|up|free|DEG",
-    help="Elevation of the end effector at a tip target; free lets the hold choose it.",
-)
-hold_option = click.option(
-    "--hold",
-    default="horizontal",
-    show_default=True,
-    metavar="HOLD",
-    help=f"Extra constraint of a tip target: {CONSTRAINTS}.",
-)
 
 
 def given_catalogue() -> str | None:
-    """What --catalogue names."""
+    """Return what --catalogue names."""
     name: str | None = click.get_current_context().meta.get(_CATALOGUE)
     return name
 
 
 def load_boom(boom_file: str | None, payload: float | None = None) -> Boom:
-    """The boom of --boom and --catalogue, with the payload of --payload."""
+    """Return the boom of --boom and --catalogue, with the payload of --payload."""
     boom = Boom.load(boom_file, given_catalogue())
     return boom if payload is None else boom.with_payload(payload)
 
 
 def load_vehicle(vehicle: str | None) -> "VehicleCase":
-    """The case of --vehicle; else the vehicle rests on level ground."""
+    """Return the case of --vehicle; otherwise the vehicle rests on level ground."""
     from planner.motion.vehicle import LEVEL, load_case
 
     return LEVEL if vehicle is None else load_case(vehicle)
 
 
 def check_picture(picture: str | None) -> None:
-    """Whether the drives' page can have that name, before the work."""
+    """Refuse a name that the drives' page cannot have, before the work."""
     if picture is not None and not picture.endswith(".png"):
         raise InputError(f"{picture}: the drives' page is written as .png")
 
 
 def outputs(*files: str | None, document: str | None = None, inputs: Iterable[str | None] = ()) -> "Outputs":
-    """What the command writes, its report last, checked before the work; see `Outputs`.
+    """Return what the command writes, its report last, checked before the work; see `Outputs`.
 
     Raises:
         InputError: as `Outputs`, a report cannot have that name, or a file has the name of one of its pictures.

@@ -11,12 +11,13 @@ import click
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
 
     from planner.reports.report import Report
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
-_PIPE_WIDTH = 132
+_BETWEEN = 2  # columns between two cells
+_SHORT = 18
+"""Cells of up to this many characters are kept on one line."""
 _LOUD = "boom.stdout"
 
 STYLES = {
@@ -31,55 +32,142 @@ STYLES = {
 }
 
 
-def print_report(report: "Report", written: dict[str, str], as_json: bool) -> int:
-    """Prints a report as tables and sentences or as JSON; returns the exit code."""
+def print_report(
+    report: "Report", asked: str, written: Mapping[str, str], as_json: bool, whole: bool = False, then: str | None = None
+) -> int:
+    """Print what a report says first, all of it, or its JSON; return the exit code.
+
+    Args:
+        report: what was checked.
+        asked: what was asked for, in a line.
+        written: the files, by kind.
+        as_json: print JSON instead.
+        whole: print every row, assumption and note.
+        then: the next command to try.
+    """
     from planner.checks.rows import Verdict
-    from planner.reports.report import CERTIFICATE_HEADER, PEAK_HEADER, cells, peak_cells, worst_cells
 
     if as_json:
-        print_json(report.to_json(written))
+        print_json(report.to_json(dict(written)))
     else:
-        table = new_table("joint", "check", "demand", "limit", "margin", "required", "at", "verdict", "basis")
-        for i, row in enumerate(report.rows):
-            last = i + 1 == len(report.rows) or report.rows[i + 1].joint != row.joint
-            table.add_row(*cells(row), style=STYLES.get(row.verdict), end_section=last)
-        console = new_console()
-        console.print(table)
-        click.echo("Largest torques and where they come from (Nm, the extension's N)")
-        print_rows(PEAK_HEADER, map(peak_cells, report.peaks))
-        if report.certificate is not None:
-            click.echo("Worst ratio to each limit")
-            print_rows(CERTIFICATE_HEADER, map(worst_cells, report.certificate.worst))
-        for sentence in report.sentences:
-            click.echo(sentence)
-        print_lines("Note", report.notes)
-        print_lines("Assumed", report.assumptions)
-        print_lines("Would mend it", report.suggestions)
-        console.print(f"{report.profile}, {report.duration:.3f} s", highlight=False)
-        console.print(report.summary, style=STYLES.get(report.verdict), highlight=False, soft_wrap=True)
+        _print_answer(report, asked, whole)
+        if whole:
+            _print_details(report)
         print_files(written)
+        print_lines("next", [] if then is None else [then])
     if report.verdict is not Verdict.FAIL:
         return 0
     complain(report.summary)
     return ANSWER_IS_NO
 
 
-def print_rows(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Prints a table."""
-    table = new_table(*header)
-    for row in rows:
-        table.add_row(*row)
-    new_console().print(table)
+def _print_answer(report: "Report", asked: str, whole: bool) -> None:
+    from planner.reports.answer import JOINT_HEADER, answer
+
+    first, console = answer(report), new_console()
+    console.print(asked, highlight=False)
+    console.print(first.sentence, style=STYLES.get(first.verdict), highlight=False)
+    print_rows(
+        JOINT_HEADER,
+        first.joints,
+        drop=("at", "motor", "gearbox", "used"),
+        styles=[STYLES.get(r[-1][:4]) for r in first.joints],
+    )
+    for finding in first.findings:
+        console.print(finding, style=STYLES.get(finding.split()[0]), highlight=False)
+    print_lines("possible fix", report.suggestions)
+    if not whole:
+        figures = f"{first.assumed} assumed figure{'' if first.assumed == 1 else 's'}"
+        console.print(f"{figures}, {len(report.rows)} checks: --all lists them", highlight=False)
+
+
+def _print_details(report: "Report") -> None:
+    from planner.reports.report import CERTIFICATE_HEADER, PEAK_HEADER, ROW_HEADER, cells, peak_cells, worst_cells
+
+    rows = report.rows
+    last = [i + 1 == len(rows) or rows[i + 1].joint != row.joint for i, row in enumerate(rows)]
+    print_rows(
+        ROW_HEADER,
+        map(cells, rows),
+        drop=("basis", "required", "at"),
+        styles=[STYLES.get(row.verdict) for row in rows],
+        ends=last,
+    )
+    click.echo("Largest torques and where they come from (Nm, the extension's N)")
+    print_rows(PEAK_HEADER, map(peak_cells, report.peaks), drop=("at", "vehicle", "friction", "velocity"))
+    if report.certificate is not None:
+        click.echo("Worst ratio to each limit")
+        print_rows(CERTIFICATE_HEADER, map(worst_cells, report.certificate.worst))
+    print_lines(None, report.sentences)
+    print_lines("note", report.notes)
+    print_lines("assumed", report.assumptions)
+
+
+def print_rows(
+    header: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    drop: Sequence[str] = (),
+    styles: Sequence[str | None] = (),
+    ends: Sequence[bool] = (),
+) -> None:
+    """Print a table that fits the console; numbers stay whole.
+
+    Args:
+        header: names of the columns.
+        rows: cells.
+        drop: columns to leave out where the table is too wide, the first of them first.
+        styles: of each row.
+        ends: whether a row ends a section.
+    """
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    console, listed = new_console(), [tuple(row) for row in rows]
+    kept = _fitting(header, listed, drop, console.width)
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    for i in kept:
+        table.add_column(header[i], no_wrap=not _folds(listed, i), overflow="fold")
+    for k, row in enumerate(listed):
+        style = styles[k] if k < len(styles) else None
+        table.add_row(*(row[i] for i in kept), style=style, end_section=k < len(ends) and ends[k])
+    console.print(table)
+    left = [header[i] for i in range(len(header)) if i not in kept]
+    if left:
+        console.print(f"(a wider terminal also shows: {', '.join(left)})", style="dim", highlight=False)
+
+
+def _folds(rows: Sequence[Sequence[str]], column: int) -> bool:
+    """Whether a column holds text, which may fold; a number may not."""
+    return max((len(row[column]) for row in rows), default=0) > _SHORT
+
+
+def _fitting(header: Sequence[str], rows: Sequence[Sequence[str]], drop: Sequence[str], width: int) -> list[int]:
+    """The columns that fit a width; text folds down to its longest word before a column is left out."""
+
+    def needed(i: int) -> int:
+        column = [header[i], *(row[i] for row in rows)]
+        if _folds(rows, i):
+            return max(len(word) for cell in column for word in cell.split() or [""])
+        return max(map(len, column))
+
+    kept = list(range(len(header)))
+    for name in (None, *drop):
+        if name is not None and name in header:
+            kept.remove(header.index(name))
+        if sum(needed(i) + _BETWEEN for i in kept) <= width:
+            break
+    return kept
 
 
 def print_lines(title: str | None, lines: Iterable[str]) -> None:
-    """Prints each line after its title; nothing without one."""
-    for line in () if title is None else lines:
-        click.echo(f"{title}: {line}")
+    """Print each line, after its title where there is one, folded to the console."""
+    console = new_console()
+    for line in lines:
+        console.print(line if title is None else f"{title}: {line}", highlight=False)
 
 
 def print_files(written: Mapping[str, str]) -> None:
-    """Prints what was written, by kind."""
+    """Print what was written, by kind; a file's name is never folded."""
     for kind, name in written.items():
         click.echo(f"{kind}: {name}")
 
@@ -122,16 +210,7 @@ def quieten(ctx: click.Context, _: click.Parameter, quiet: bool) -> None:
 
 
 def new_console() -> "Console":
-    """A console as wide as the terminal, or of a fixed width in a pipe."""
+    """Return a console as wide as the terminal or COLUMNS, and of 80 columns in a pipe."""
     from rich.console import Console
 
-    width = None if sys.stdout.isatty() else _PIPE_WIDTH
-    return Console(width=width, markup=False)  # a unit in brackets is no style
-
-
-def new_table(*columns: str) -> "Table":
-    """An empty table with these columns."""
-    from rich.box import SIMPLE
-    from rich.table import Table
-
-    return Table(*columns, box=SIMPLE, pad_edge=False)
+    return Console(markup=False, soft_wrap=False)  # a unit in brackets is no style

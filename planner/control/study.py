@@ -133,6 +133,22 @@ class Study:
         return tuple(f"{row.profile}, {row.controller}, shaper {row.shaper}: {row.reason}" for row in self.rows if row.reason)
 
     @property
+    def leading(self) -> tuple[Row, ...]:
+        """The cases to look at first: up to six that fail, and of each profile the one that shakes and errs least.
+
+        All of them where there are no more than eight.
+        """
+        if len(self.rows) <= 8:
+            return self.rows
+        failed = [row for row in self.rows if row.outcome in FAILED][:6]
+        following = [row for row in self.rows if row.outcome not in FAILED]
+        best = [
+            min((row for row in following if row.profile == profile), key=lambda row: row.tip_error_rms_m or np.inf)
+            for profile in dict.fromkeys(row.profile for row in following)
+        ]
+        return (*failed, *best)
+
+    @property
     def summary(self) -> str:
         """How many cases came to what."""
         counts = {o: sum(row.outcome is o for row in self.rows) for o in Outcome}

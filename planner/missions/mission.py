@@ -25,12 +25,12 @@ from planner.checks.drives.duty import Duty
 from planner.files import named_file
 from planner.motion.trajectory import STEP, Trajectory
 from planner.motion.vehicle import LEVEL, VehicleCase
-from planner.move_spec import MoveSpec
-from planner.paths.targets import TipTarget, parse_joint_velocity, parse_pitch, parse_target, resolve
+from planner.move_spec import MoveWords
+from planner.paths.targets import Target, TipTarget, parse_pitch, parse_target, resolve
 from planner.planning import check, plan_motion
 from planner.progress import Track
 from planner.reports.report import Report
-from planner.timing.profile import JerkLimited, parse_profile
+from planner.timing.profile import JerkLimited
 from planner.timing.travel_mean import trapezoid_weights
 
 _FOLDER = Path(str(files("planner.missions") / "named_missions"))
@@ -38,6 +38,8 @@ _MOST_STEPS = 100_000
 _SAME_POSITION = 1e-6
 _DECIMALS = 9
 _DOWN, _HORIZONTAL = "down", "horizontal"
+_SHARED = ("profile", "pass_via", "jerk_bound", "average_torque", "along", "pitch", "constraint")
+"""Keys of a step that are fields of MoveWords as they are."""
 _Duration = Annotated[float, DURATION]
 
 
@@ -52,7 +54,7 @@ class _Step(Table):
     average_torque: bool = False
     duration_s: _Duration | None = None
     pitch: str = _DOWN
-    hold: str = _HORIZONTAL
+    constraint: str = _HORIZONTAL
     hold_s: _Duration | None = None
     pause_s: _Duration | None = None
     repeat: Annotated[int, Field(gt=0)] | None = None
@@ -81,7 +83,7 @@ class _MissionTable(Table):
     source: str
     start: str
     pitch: str = _DOWN
-    hold: str = _HORIZONTAL
+    constraint: str = _HORIZONTAL
     required_life_h: Annotated[float, LIFE] | None = None
     tip_tolerance_mm: Annotated[float, TIP_TOLERANCE] | None = None
     steps: Annotated[list[_Step], Field(min_length=1)]
@@ -234,7 +236,7 @@ def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase = LEVEL, step:
     """
     check_steady(vehicle)
     table = mission.table
-    q = resolve(boom, parse_target(table.start), parse_pitch(table.pitch), parse_constraint(table.hold))
+    q = resolve(boom, parse_target(table.start), parse_pitch(table.pitch), parse_constraint(table.constraint))
     start, legs, known, order, notes = q, [], {}, [], []
     steps = list(islice(_expanded(table.steps, "steps"), _MOST_STEPS + 1))
     if len(steps) > _MOST_STEPS:
@@ -318,22 +320,16 @@ def _leg(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -
 def _move(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -> tuple[Leg | None, Array, tuple[str, ...]]:
     by_joints = part.along == "joint"
     x, y, z = (float(v) for v in forward_kinematics(boom, q).position)
-    velocities = [parse_joint_velocity(text) for text in part.via_velocity] or None
-    spec = MoveSpec.of(
-        q if by_joints else TipTarget((x, y, z)),
-        str(part.to),
-        via=part.via,
-        stop_at_via=not part.pass_via,
-        constraint=part.hold,
-        pitch=part.pitch,
-        along=part.along,
-        profile=parse_profile(
-            part.profile, jerk_bound=part.jerk_bound, average_torque=part.average_torque, velocities=velocities
-        ),
+    words = MoveWords(
+        start=str(part.to),
+        goal=str(part.to),
+        via=tuple(part.via),
+        via_velocity=tuple(part.via_velocity),
         duration=part.duration_s,
-        vehicle=vehicle,
-        step=step,
+        **{name: getattr(part, name) for name in _SHARED},
     )
+    start: Target = q if by_joints else TipTarget((x, y, z))
+    spec = replace(words.spec(), start=start, vehicle=vehicle, step=step)
     planned = plan_motion(boom, spec, reference=q)
     if not planned.motions:
         return None, q, ()
@@ -342,7 +338,7 @@ def _move(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) 
     if apart > _SAME_POSITION:
         raise InfeasibleError(
             f"the line starts at another joint position than where the step before ends ({apart:.3g} rad or m off): "
-            "give both the same pitch and hold"
+            "give both the same pitch and constraint"
         )
     way = part.to if by_joints else f"{part.to} along {part.along}"
     label = " ".join([f"to {way}", *(f"via {text}" for text in part.via)])

@@ -178,6 +178,8 @@ def _rounded(value: float) -> str:
     return f"{float(f'{value:.4g}'):.12g}"
 
 
+ROW_HEADER = ("joint", "check", "demand", "limit", "margin", "required", "at", "verdict", "basis")
+
 CERTIFICATE_HEADER = ("limit", "joint", "worst ratio", "at")
 
 

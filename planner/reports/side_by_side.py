@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from boom_model import JOINTS, InputError
 from planner.checks.kinds import DRIVE_PARTS
 from planner.checks.rows import Row
+from planner.reports.answer import joint_table
 from planner.reports.markdown import section, table
 from planner.reports.report import Report, cells
 
@@ -66,3 +67,13 @@ def _pair(row: Row | None) -> tuple[str, str]:
     _, _, demand, limit, margin, *_ = cells(row)
     asked = demand if limit == "-" else f"{demand} of {limit}"
     return asked, row.verdict if margin == "-" else f"{margin}, {row.verdict}"
+
+
+def loads_side_by_side(reports: Mapping[str, Report]) -> list[tuple[str, ...]]:
+    """Return a row for each joint: of each report the largest load, the share of its tightest limit, and the verdict."""
+    tables = [{row[0]: row for row in joint_table(report)} for report in reports.values()]
+    rows = []
+    for joint in dict.fromkeys(name for each in tables for name in each):
+        found = [each.get(joint) for each in tables]
+        rows.append((joint, *("-" if row is None else f"{row[1]}, {row[3]}, {row[-1]}" for row in found)))
+    return rows

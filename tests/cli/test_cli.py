@@ -28,7 +28,7 @@ def test_plan_does_the_main_job(boom, tmp_path):
 
 @pytest.mark.parametrize("profile", [profile.value for profile in Profile])
 def test_plan_as_json_prints_one_object(boom, profile):
-    code, out, _ = boom("plan", "transport", "tip=1.4,0,1.0", "--hold", "extension=0.25", "--profile", profile, "--json")
+    code, out, _ = boom("plan", "transport", "tip=1.4,0,1.0", "--constraint", "extension=0.25", "--profile", profile, "--json")
     answer = json.loads(out)
     assert code == 0
     assert answer["profile"] == profile
@@ -167,12 +167,12 @@ def test_empty_move_is_said_so(boom):
 
 
 def test_ik_lists_every_branch(boom):
-    code, out, _ = boom("ik", "1.4", "0", "1.0", "--hold", "extension=0.25", "--json")
+    code, out, _ = boom("ik", "1.4", "0", "1.0", "--constraint", "extension=0.25", "--json")
     answer = json.loads(out)
     assert code == 0
     assert set(answer) == {"target", "solutions", "best"}
     np.testing.assert_allclose(answer["solutions"][answer["best"]]["q"], [0, 1.203, 3.097, 0.25, 0.045], atol=5e-4)
-    code, out, _ = boom("ik", "1.4", "0", "1.0", "--hold", "extension=0.25")
+    code, out, _ = boom("ik", "1.4", "0", "1.0", "--constraint", "extension=0.25")
     assert code == 0
     assert "68.9229" in out
 
@@ -195,7 +195,7 @@ def test_ik_takes_negative_numbers(boom):
 
 
 def test_ik_out_of_reach_is_a_reasoned_no(boom):
-    code, out, err = boom("ik", "2", "0", "3", "--hold", "extension=0", "--json")
+    code, out, err = boom("ik", "2", "0", "3", "--constraint", "extension=0", "--json")
     answer = json.loads(out)
     assert code == 1
     assert (answer["solutions"], answer["best"]) == ([], None)
@@ -249,9 +249,9 @@ def test_validate_holds(boom):
         (("plan", "transport", "phenotyping", "--boom", "bad.toml"), 2, "bad.toml: key name is missing"),
         (("plan", "transport", "q=0,1,2"), 2, "has 3 numbers"),
         (("plan", "transport", "q=0,130,180,0,0"), 1, "inner 130 deg is 10 deg above"),
-        (("plan", "transport", "tip=2,0,3", "--hold", "extension=0"), 1, "out of reach"),
+        (("plan", "transport", "tip=2,0,3", "--constraint", "extension=0"), 1, "out of reach"),
         (("plan", "transport", "tip=0,2.5,0.8", "--pitch", "up"), 1, "wrist 180 deg is 90 deg above its limit"),
-        (("plan", "transport", "tip=1,0,1", "--hold", "sideways"), 2, "hold 'sideways' is not known"),
+        (("plan", "transport", "tip=1,0,1", "--constraint", "sideways"), 2, "hold 'sideways' is not known"),
         (("ik", "1", "nan", "1"), 2, "position[1] is nan"),
         (("ik", "1", "x", "1"), 2, "'x' is not a valid float"),
         (("ik", "1", "0", "1", "--hodl", "horizontal"), 2, "--hodl"),

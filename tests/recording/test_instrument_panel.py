@@ -406,9 +406,9 @@ def test_profiles_are_recorded_by_the_command(tmp_path: Path, monkeypatch: pytes
 def test_reach_is_recorded_by_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any):
     monkeypatch.chdir(tmp_path)
     at_rest = ("plan", "transport", "transport", "--show-reach")
-    assert boom(monkeypatch, *at_rest, "--hold", "extension=0.25") == 0
+    assert boom(monkeypatch, *at_rest, "--constraint", "extension=0.25") == 0
     assert "; grey line: reach with constraint extension=0.25 m, pitch -90" in Read(tmp_path / "move.rrd").titles()["/world"]
-    assert boom(monkeypatch, *at_rest, "--hold", "extension=5", "--out", "nothing.rrd") == 0
+    assert boom(monkeypatch, *at_rest, "--constraint", "extension=5", "--out", "nothing.rrd") == 0
     nothing = Read(tmp_path / "nothing.rrd")
     assert "/world/reach" not in nothing.entities()
     assert nothing.titles()["/world"].endswith("; no point reachable with constraint extension=5 m, pitch -90 deg")
