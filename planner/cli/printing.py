@@ -154,7 +154,7 @@ def _fitting(header: Sequence[str], rows: Sequence[Sequence[str]], drop: Sequenc
     for name in (None, *drop):
         if name is not None and name in header:
             kept.remove(header.index(name))
-        if sum(needed(i) + _BETWEEN for i in kept) <= width:
+        if sum(needed(i) + _BETWEEN for i in kept) - _BETWEEN <= width:
             break
     return kept
 
