@@ -28,6 +28,7 @@ PITCHES = {"down": -np.pi / 2.0, "level": 0.0, "up": np.pi / 2.0}
 CHOICES = {
     str(hold): hold for hold in (ActuatorHorizontal(), LeastExtension(), NearestHorizontal(), LeastTorque(), LargestMargin())
 }
+_NOTHING = 1e-12  # degrees or metres: a distance as small would ask for an infinite speed along the path
 HOLDS = f"{', '.join(CHOICES)}, actuator=DEG, extension=M, nearest=DEG,DEG,DEG,M,DEG"
 
 
@@ -191,4 +192,4 @@ def _number(name: str, text: str, what: str) -> float:
     if not np.isfinite(value):
         raise InputError(f"{name}: {text!r} must be finite")
     NUMBER.require(name, value)
-    return value
+    return value if abs(value) > _NOTHING else 0.0
