@@ -125,10 +125,10 @@ class Limits:
     def __post_init__(self) -> None:
         for name, (angular, linear) in _LIMITS.items():
             values = _of_shape(name, getattr(self, name), (5,))
-            angular.require(f"{name} limit of a joint", np.degrees(values[~IS_LENGTH]))
+            angular.require_radians(f"{name} limit of a joint", values[~IS_LENGTH])
             linear.require(f"{name} limit of the extension", values[IS_LENGTH])
-        LINKAGE_ANGLE.require("linkage", np.degrees(scalar("linkage", self.linkage)))
-        TRANSMISSION_ANGLE.require("transmission", np.degrees(scalar("transmission", self.transmission)))
+        LINKAGE_ANGLE.require_radians("linkage", scalar("linkage", self.linkage))
+        TRANSMISSION_ANGLE.require_radians("transmission", scalar("transmission", self.transmission))
 
     def excess(self, q: ArrayLike) -> Array:
         """How far q is outside each position limit, shape (..., 6); negative inside.
@@ -228,7 +228,7 @@ class Boom:
         GRAVITY.require("gravity", scalar("gravity", self.gravity))
         for name, q in self.poses.items():
             angles = _of_shape(f"pose {name!r}", q, (5,))
-            ANGLE.require(f"pose {name!r}", np.degrees(angles[~IS_LENGTH]))
+            ANGLE.require_radians(f"pose {name!r}", angles[~IS_LENGTH])
             OFFSET.require(f"pose {name!r}", angles[IS_LENGTH])
 
     @staticmethod

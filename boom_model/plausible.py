@@ -41,6 +41,15 @@ class Range(GroupedMetadata):
             value, unit = float(array[outside].flat[0]), f" {self.unit}" if self.unit else ""
             raise InputError(f"{name} is {value:g}{unit}; it must be between {self.low:g} and {self.high:g}{unit}")
 
+    def require_radians(self, name: str, values: ArrayLike) -> None:
+        """The same for angles in radians, where the bounds are in degrees.
+
+        Raises:
+            InputError: as `require`.
+        """
+        with np.errstate(over="ignore"):
+            self.require(name, np.degrees(values))
+
 
 # The boom
 LENGTH = Range(1e-3, 30.0, "m")

@@ -6,6 +6,8 @@ from boom_model.arrays import Array
 from boom_model.errors import InputError
 from boom_model.plausible import NUMBER
 
+_NOTHING = 1e-12  # degrees or metres: a distance as small would ask for an infinite speed along the path
+
 
 def joint_position(text: str, rest: str) -> Array:
     """Return a joint position (5,) in SI from five numbers with commas: degrees, the extension in metres.
@@ -47,4 +49,4 @@ def number(name: str, text: str, what: str) -> float:
     if not np.isfinite(value):
         raise InputError(f"{name}: {text!r} must be finite")
     NUMBER.require(name, value)
-    return value
+    return value if abs(value) > _NOTHING else 0.0

@@ -1,13 +1,11 @@
 """Moves that are planned and checked, and what people keep of them: reports, recordings, files.
 
 `planner` offers what a notebook starts with; the rest stands in its rooms (`planner.checks.certificate` and so on). A name is
-imported when it is first used, so that the command answers to a signal from its first moment.
+imported when it is first used: the command imports this package before it can handle a signal, so that even `typing` would
+take too long here.
 """
 
-from importlib import import_module
-from importlib.metadata import version
-from typing import TYPE_CHECKING
-
+TYPE_CHECKING = False  # as in `typing`; a type checker takes it for True
 if TYPE_CHECKING:
     from planner.checks.rows import Verdict as Verdict
     from planner.experiments.comparison import compare as compare
@@ -53,8 +51,10 @@ __all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> object:
+    from importlib import import_module, metadata
+
     if name == "__version__":
-        return version("boom")
+        return metadata.version("boom")
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,22 +1,35 @@
 """The process of the command `boom`, or `python -m planner`: what holds from its first moment to its last.
 
-This module imports nothing that takes time, so that a signal during the imports finds its handler.
+It imports nothing that takes time before the signals have their handler.
 """
 
 import os
 import signal
 import sys
-import warnings
-from types import FrameType
-from typing import NoReturn
 
 _STOPPED = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
-def main() -> NoReturn:
+def _stop(number: int, _: object) -> None:
+    """Ends the process at once.
+
+    An exception would have to pass through libraries that swallow it, or turn it into an error of theirs.
+    """
+    discard = getattr(sys.modules.get("planner.files"), "discard", None)
+    if discard is not None:
+        discard()
+    try:
+        os.write(2, f"boom: {_STOPPED[signal.Signals(number)]}\n".encode())
+    finally:
+        os._exit(128 + number)
+
+
+def main() -> None:
     """Run the command; exit 130 or 143 with one line when it is interrupted or terminated, else as `planner.cli.main`."""
     for number in _STOPPED:
         signal.signal(number, _stop)
+    import warnings
+
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever the user's windows are drawn with
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file's name may hold any byte
@@ -29,21 +42,6 @@ def main() -> NoReturn:
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    sys.exit()
-
-
-def _stop(number: int, _: FrameType | None) -> NoReturn:
-    """Ends the process at once.
-
-    An exception would have to pass through libraries that swallow it, or turn it into an error of theirs.
-    """
-    discard = getattr(sys.modules.get("planner.files"), "discard", None)
-    if discard is not None:
-        discard()
-    try:
-        os.write(2, f"boom: {_STOPPED[signal.Signals(number)]}\n".encode())
-    finally:
-        os._exit(128 + number)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ def _meaning(error: BaseException) -> tuple[int, str]:
     if isinstance(error, click.Abort | KeyboardInterrupt):
         return INTERRUPTED, "interrupted"
     if isinstance(error, MemoryError | OverflowError | RecursionError | FloatingPointError | RuntimeWarning):
-        return BAD_INPUT, f"the numbers given are beyond what can be computed: {error or type(error).__name__}"
+        return BAD_INPUT, f"the numbers given are beyond what can be computed: {str(error) or type(error).__name__}"
     if isinstance(error, OSError):
         return BAD_INPUT, _refused(error)
     return INTERNAL_ERROR, (
