@@ -13,6 +13,7 @@ from boom_model.errors import InputError
 from planner.paths.path import JointLine, SplinePath
 from planner.timing.limit_ratios import RATIO_TOLERANCE, rate_ratios
 from planner.timing.path_limits import load_ratio
+from planner.timing.profiles.ruckig_pieces import brake_to_rest
 from planner.timing.time_law import Motion, TimeLaw
 
 MOMENTS = 100
@@ -33,9 +34,6 @@ class Way(StrEnum):
     """Each joint brakes by itself: the tip leaves its path."""
     FINISH = "finishes the move"
     """No stop that keeps the limits is shorter."""
-
-
-Numbers = Sequence[float] | Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +149,7 @@ def _path_brake(motion: Motion, at: float, share: float, limits: tuple[float, fl
     """s(t) from a moment to rest with a share of the path's limits; None where it runs over the path's end."""
     law, unit = motion.law, motion.duration  # as in `jerk_limited`: ruckig wants numbers of order one
     state = [[float(law.s(at, order)) * unit**order] for order in range(3)]
-    found = _braked(state, [share * limits[0] * unit**2], [share * limits[1] * unit**3] if law.jerk_limited else None)
+    found = brake_to_rest(state, [share * limits[0] * unit**2], [share * limits[1] * unit**3] if law.jerk_limited else None)
     if found is None:
         return None
     braked = TimeLaw.from_pieces(found[0][0], found[0][1], jerk_limited=law.jerk_limited).stretched(unit)
@@ -164,7 +162,7 @@ def _joint_brake(boom: Boom, motion: Motion, at: float, share: float) -> Motion 
 
     q, qd, qdd, _ = motion(at)
     jerk = share * boom.limits.jerk if motion.law.jerk_limited else None
-    found = _braked([q, qd, qdd], share * boom.limits.acceleration, jerk)
+    found = brake_to_rest([q, qd, qdd], share * boom.limits.acceleration, jerk)
     if found is None:
         return None
     duration = max(float(t.sum()) for t, _ in found)
@@ -178,31 +176,6 @@ def _joint_brake(boom: Boom, motion: Motion, at: float, share: float) -> Motion 
     spline = PPoly(coefficients * duration ** np.arange(3.0, -1.0, -1.0)[:, None, None], breaks / duration)
     law = TimeLaw.from_pieces(np.diff(breaks) / breaks[-1], [np.ones(len(breaks) - 1), breaks[:-1] / breaks[-1]])
     return Motion(SplinePath(spline, q[None]), TimeLaw(law.s, motion.law.jerk_limited).stretched(float(breaks[-1])))
-
-
-def _braked(state: Sequence[Numbers], acceleration: Numbers, jerk: Numbers | None) -> list[tuple[Array, Array]] | None:
-    """ruckig's polynomials to rest from (position, velocity, acceleration), one for each degree of freedom."""
-    from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
-
-    from planner.timing.profiles.ruckig_pieces import pieces
-
-    count = len(acceleration)
-    problem = InputParameter(count)
-    problem.control_interface, problem.synchronization = ControlInterface.Velocity, Synchronization.No
-    problem.current_position, problem.current_velocity = [list(map(float, each)) for each in state[:2]]
-    # Without a limit on jerk an acceleration is given up at once.
-    problem.current_acceleration = [0.0] * count if jerk is None else list(map(float, state[2]))
-    problem.target_velocity = problem.target_acceleration = [0.0] * count
-    problem.max_acceleration = list(map(float, acceleration))
-    problem.max_jerk = [float("inf")] * count if jerk is None else list(map(float, jerk))
-    solution = Trajectory(count)
-    try:
-        result = Ruckig(count).calculate(problem, solution)
-    except RuckigError:  # its way to say that it found nothing
-        return None
-    if result != Result.Working or not solution.duration > 0.0:
-        return None
-    return [pieces(profile) for profile in solution.profiles[0]]
 
 
 def _kept(boom: Boom, motions: list[Motion | None], base: BaseMotion | None) -> Mask:

@@ -32,8 +32,7 @@ def outcome(number: int) -> str:
     try:
         motions = plan.motions()
     except BoomError as refusal:
-        assert len(str(refusal)) > 20, number
-        return "refused"
+        return "refused" if len(str(refusal)) > 20 else "refused without a reason"
     overloaded = False
     for motion in motions:
         found = worst(plan.boom, motion, motion.duration / 5000, jerk=motion.law.jerk_limited)
