@@ -50,6 +50,7 @@ def outcome(number: int) -> str:
 def test_joint_limits_are_kept_whatever_is_asked(first):
     outcomes = [outcome(number) for number in range(first, first + TOGETHER)]
     assert "planned" in outcomes
+    assert "refused without a reason" not in outcomes
 
 
 @pytest.mark.parametrize("number", BROKE_ONCE)
