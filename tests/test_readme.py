@@ -1,4 +1,4 @@
-"""What the README shows of missions and drives is what the toolkit gives."""
+"""What README and guide show of missions and drives is what the toolkit gives; both stay short."""
 
 import re
 from pathlib import Path
@@ -12,15 +12,18 @@ from planner.reports.side_by_side import compared, comparison_markdown
 from planner.sizing.choice import Choice, candidates, fitted, parse_variant, size
 from tests.field_day import field_day
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+PAGES = {page.stem: page.read_text(encoding="utf-8") for page in sorted((ROOT / "demos" / "guide").glob("*.md"))}
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 BOOM = Boom.load()
-EXAMPLES = re.findall(r"```toml\n(.*?)```", README, flags=re.DOTALL)
+MISSION, *_ = re.findall(r"```toml\n(.*?)```", PAGES["drives"], flags=re.DOTALL)
+ACTUATOR, _KEEP_OUT = re.findall(r"```toml\n(.*?)```", PAGES["your-boom"], flags=re.DOTALL)
 
 
 def test_the_thesis_s_design_is_judged_as_printed():
     missions = [load_mission(name) for name in ("table-2-4", "table-3-1")]
     reports = {each.name: check_cycle(BOOM, plan_cycle(BOOM, each)) for each in missions}
-    assert comparison_markdown(*compared(reports, ("inner", "lower"))) in README
+    assert comparison_markdown(*compared(reports, ("inner", "lower"))) in PAGES["sizing"]
 
 
 VARIANTS = {
@@ -43,9 +46,9 @@ def test_the_lightest_motors_are_those_printed(name, mission):
         cells.append(f"{choice.lightest.drive.motor.name}, {choice.lightest.tightest('motor').margin * 100:.0f} %")
         saved += choice.saves
     if mission == "field-day":
-        assert f"| {name} | {cells[0]} | {cells[1]} | {saved:.1f} kg |" in README
+        assert f"| {name} | {cells[0]} | {cells[1]} | {saved:.1f} kg |" in PAGES["sizing"]
     else:
-        (row,) = re.findall(rf"\| {name} \| (\w+), \d+ % \| (\w+), \d+ % \| ([\d.]+) kg \|", README)
+        (row,) = re.findall(rf"\| {name} \| (\w+), \d+ % \| (\w+), \d+ % \| ([\d.]+) kg \|", PAGES["sizing"])
         assert row == (cells[0].split(",")[0], cells[1].split(",")[0], f"{saved:.1f}")
 
 
@@ -57,7 +60,7 @@ def test_half_the_link_takes_a_tenth_off_joint_2():
 
 
 def test_the_mission_of_the_readme_can_be_planned(tmp_path):
-    (tmp_path / "mine.toml").write_text(EXAMPLES[0])
+    (tmp_path / "mine.toml").write_text(MISSION)
     cycle = plan_cycle(BOOM, load_mission(str(tmp_path / "mine.toml")))
     assert cycle.counts.max() == 10
     tip = next(row for row in check_cycle(BOOM, cycle).rows if row.check == "deflection in all")
@@ -65,5 +68,20 @@ def test_the_mission_of_the_readme_can_be_planned(tmp_path):
 
 
 def test_the_actuator_of_the_readme_can_be_read(tmp_path):
-    (tmp_path / "mine.toml").write_text(EXAMPLES[1])
+    (tmp_path / "mine.toml").write_text(ACTUATOR)
     assert Catalogue.load().with_file(tmp_path / "mine.toml").actuators["MINE"].stroke == 1.0
+
+
+def test_readme_and_guide_are_short():
+    assert len(README.splitlines()) <= 200
+    assert len(README.split()) <= 2500
+    for name, page in PAGES.items():
+        assert len(page.splitlines()) <= 200, name
+
+
+def test_the_contents_list_every_page_and_every_link_leads_somewhere():
+    contents = (ROOT / "demos" / "README.md").read_text(encoding="utf-8")
+    assert {f"guide/{name}.md" for name in PAGES} == set(re.findall(r"guide/[a-z-]+\.md", contents))
+    for folder, text in ((ROOT, README), (ROOT / "demos", contents), *((ROOT / "demos" / "guide", page) for page in PAGES.values())):
+        for target in re.findall(r"\]\((?!http)([^)#]+)\)", text):
+            assert (folder / target).exists(), target
