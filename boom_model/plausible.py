@@ -10,11 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from annotated_types import Ge, GroupedMetadata, Le
 from numpy.typing import ArrayLike
+from pydantic import AfterValidator
 from pydantic.types import AllowInfNan
 
 from boom_model.errors import InputError
 
 _ROUNDING = 1e-9  # relative, of a change of unit
+_NOTHING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -26,8 +28,8 @@ class Range(GroupedMetadata):
     unit: str
 
     def __iter__(self) -> Iterator[object]:
-        """What pydantic holds a number to."""
-        return iter((AllowInfNan(False), Ge(self.low), Le(self.high)))
+        """What pydantic holds a number to; one below 1e-12 is what rounding has left of a zero."""
+        return iter((AllowInfNan(False), Ge(self.low), Le(self.high), AfterValidator(_without_rounding)))
 
     def require(self, name: str, values: ArrayLike) -> None:
         """Whether every value is within the bounds.
@@ -49,6 +51,10 @@ class Range(GroupedMetadata):
         """
         with np.errstate(over="ignore"):
             self.require(name, np.degrees(values))
+
+
+def _without_rounding(value: float) -> float:
+    return value if abs(value) >= _NOTHING else 0.0
 
 
 # The boom

@@ -154,6 +154,13 @@ def test_a_boom_file(tmp_path, old, new, key):
     assert str(refused.value).startswith(f"{tmp_path / 'mine.toml'}: key {key}")
 
 
+def test_what_rounding_leaves_of_a_zero_in_a_file_is_zero(tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        BOOM_FILE.read_text(encoding="utf-8").replace("extension_m = 0.0", "extension_m = 1e-300")
+    )
+    np.testing.assert_array_equal(Boom.load(tmp_path / "mine.toml").pose("transport"), BOOM.pose("transport"))
+
+
 def test_a_motor_does_not_run_with_more_than_it_holds(tmp_path):
     text = CATALOGUE_FILE.read_text(encoding="utf-8")
     assert "running_torque_Nm = 7.2" in text

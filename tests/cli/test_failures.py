@@ -2,6 +2,7 @@
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -334,6 +335,19 @@ def test_a_long_name_is_written(boom, tmp_path):
     code, _, err = boom(*PLAN, "--csv", "n" * 6 + name)
     assert (code, is_one_line(err)) == (2, True)
     assert "File name too long" in err
+
+
+def test_a_picture_in_a_source_is_not_loaded(boom, motion, tmp_path):
+    text = BOOM_FILE.read_text(encoding="utf-8")
+    source = "not in the thesis; the motor allows 165 V"
+    assert source in text
+    remote = "![x](http://example.invalid/a.png) <img src='http://example.invalid/b.png'>"
+    (tmp_path / "mine.toml").write_text(text.replace(source, remote))
+    assert boom("check", motion, "--boom", "mine.toml", "--report", "r.html", "-q")[::2] == (0, "")
+    html = (tmp_path / "r.html").read_text()
+    assert "http://example.invalid/a.png" in html
+    assert all('src="data:image/png;base64,' in tag for tag in re.findall("<img[^>]*>", html))
+    assert "&lt;img src='http" in html.replace("&#x27;", "'")
 
 
 # Signals

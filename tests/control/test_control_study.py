@@ -199,7 +199,7 @@ def test_the_command_fails_where_the_boom_does(boom, tmp_path):
         (("--payload-error", "-20"), "payload is -10"),
         (("--controller", "stepper", "--loops", "x.png"), "no Bode diagram"),
         (("--errors", "x.jpg"), "a picture is written as .png"),
-        (("--payload-error", "nan"), "payload is nan"),
+        (("--payload-error", "nan"), "payload-error is nan kg"),
         (("--rigid-joints", "--controller", "stepper"), "no joint is elastic"),
         (("--controller", "pid", "--gust", "0,0,-30,50,1"), "gust from 50 s to 51 s; it must lie within the simulated 0 to "),
         (("--controller", "pid", "--gust", "0,0,-30,-1,0.5"), "gust from -1 s to -0.5 s; it must lie within"),
