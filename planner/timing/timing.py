@@ -138,18 +138,17 @@ def _law(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> Tim
             return jerk_limited(boom, path, base)
         case Profile.TIME_OPTIMAL:
             from planner.timing.profiles.average_torque import within_average_torque
-            from planner.timing.profiles.jerk_bound import with_jerk_bound
+            from planner.timing.profiles.jerk_bound import jerk_bounded, with_jerk_bound
+            from planner.timing.profiles.jerk_limited import evenly_limited
             from planner.timing.profiles.time_optimal import time_optimal
 
-            law = within_average_torque(boom, path, base) if timing.average_torque else time_optimal(boom, path, base)
-            if not timing.jerk_bound:
-                return law
-            smooth = with_jerk_bound(boom, path, law, base)
             if timing.average_torque:
-                return smooth
-            from planner.timing.profiles.jerk_limited import evenly_limited
-
-            return min(smooth, evenly_limited(boom, path, base)[0], key=lambda each: each.duration)
+                law = within_average_torque(boom, path, base)
+                return with_jerk_bound(boom, path, law, base) if timing.jerk_bound else law
+            if not timing.jerk_bound:
+                return time_optimal(boom, path, base)
+            laws = jerk_bounded(boom, path, base), evenly_limited(boom, path, base)[0]
+            return min(laws, key=lambda each: each.duration)
 
 
 def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | None) -> Motion:

@@ -31,8 +31,7 @@ def outcome(number: int) -> str:
     plan = random_plan(number)
     try:
         motions = plan.motions()
-    except BoomError as refusal:
-        assert len(str(refusal)) > 20, number
+    except BoomError:
         return "refused"
     overloaded = False
     for motion in motions:
