@@ -82,6 +82,10 @@ def test_readme_and_guide_are_short():
 def test_the_contents_list_every_page_and_every_link_leads_somewhere():
     contents = (ROOT / "demos" / "README.md").read_text(encoding="utf-8")
     assert {f"guide/{name}.md" for name in PAGES} == set(re.findall(r"guide/[a-z-]+\.md", contents))
-    for folder, text in ((ROOT, README), (ROOT / "demos", contents), *((ROOT / "demos" / "guide", page) for page in PAGES.values())):
+    for folder, text in (
+        (ROOT, README),
+        (ROOT / "demos", contents),
+        *((ROOT / "demos" / "guide", page) for page in PAGES.values()),
+    ):
         for target in re.findall(r"\]\((?!http)([^)#]+)\)", text):
             assert (folder / target).exists(), target

@@ -158,18 +158,17 @@ class TimeOptimal(TimingProfile):
 
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
         from planner.timing.profiles.average_torque import within_average_torque
-        from planner.timing.profiles.jerk_bound import with_jerk_bound
+        from planner.timing.profiles.jerk_bound import jerk_bounded, with_jerk_bound
+        from planner.timing.profiles.jerk_limited import evenly_limited
         from planner.timing.profiles.time_optimal import time_optimal
 
-        law = within_average_torque(boom, path, base) if self.average_torque else time_optimal(boom, path, base)
-        if not self.jerk_bound:
-            return law
-        smooth = with_jerk_bound(boom, path, law, base)
         if self.average_torque:
-            return smooth
-        from planner.timing.profiles.jerk_limited import evenly_limited
-
-        return min(smooth, evenly_limited(boom, path, base)[0], key=lambda each: each.duration)
+            law = within_average_torque(boom, path, base)
+            return with_jerk_bound(boom, path, law, base) if self.jerk_bound else law
+        if not self.jerk_bound:
+            return time_optimal(boom, path, base)
+        laws = jerk_bounded(boom, path, base), evenly_limited(boom, path, base)[0]
+        return min(laws, key=lambda each: each.duration)
 
     @property
     def limits_jerk(self) -> bool:

@@ -1,17 +1,36 @@
 """A law whose acceleration jumps, smoothed until the joints' jerk limits are kept."""
 
+from contextlib import suppress
 from functools import cache
 
 import numpy as np
 
 from boom_model import BaseMotion, Boom
-from planner.paths.path import Path
-from planner.timing.path_limits import PathLoads, peak_rate_ratios
+from planner.paths.path import JointLine, Path
+from planner.timing.path_limits import InfeasiblePathError, PathLoads, peak_rate_ratios
+from planner.timing.profiles.time_optimal import time_optimal
 from planner.timing.time_law import Motion, TimeLaw
 
 _NARROWEST = -2.5  # of the windows to average over: the power of ten, as a share of the duration
 _WINDOWS = 11
 _WINDOW_TOLERANCE = 1e-3
+_SHAPE_SHARES = (0.5, 0.25)  # of the jerk limits, that a path's shape may take
+
+
+def jerk_bounded(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+    """The fastest law found within the joints' jerk limits and their others: a time-optimal one, smoothed.
+
+    On a curved path the path's own shape asks for jerk, at a waypoint above all. Laws that are slow there, and there alone,
+    are tried besides.
+
+    Raises:
+        InfeasiblePathError: as `time_optimal`.
+    """
+    laws = [time_optimal(boom, path, base)]
+    for share in () if isinstance(path, JointLine) else _SHAPE_SHARES:
+        with suppress(InfeasiblePathError):
+            laws.append(time_optimal(boom, path, base, jerk_share=share))
+    return min((with_jerk_bound(boom, path, law, base) for law in laws), key=lambda each: each.duration)
 
 
 def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None) -> TimeLaw:
@@ -22,8 +41,8 @@ def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | Non
     window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
     makes the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is not the optimum.
 
-    The limits are looked at where the law's pieces meet, with torques interpolated along the path: between these places the
-    law may break them by a trifle.
+    The limits are looked at in few places of each of the law's pieces, with torques interpolated along the path: between these
+    places the law may break them by a trifle.
     """
     from scipy.optimize import minimize_scalar
 
@@ -33,7 +52,7 @@ def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | Non
     def smooth(exponent: float) -> TimeLaw:
         smoothed = law.averaged(law.duration * 10.0**exponent)
         motion = Motion(path, smoothed)
-        jerk = float(np.cbrt(peak_rate_ratios(boom, motion, smoothed.times(2))[2]))
+        jerk = float(np.cbrt(peak_rate_ratios(boom, motion, motion.times(1))[2]))
         return smoothed.stretched(max(1.0, jerk, loads.least_stretch(smoothed, smoothed.s.x)))
 
     exponents = np.linspace(_NARROWEST, 0.0, _WINDOWS)

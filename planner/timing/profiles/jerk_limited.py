@@ -6,9 +6,8 @@ from boom_model import BaseMotion, Boom, InfeasibleError
 from planner.paths.path import Path
 from planner.timing.path_limits import jerk_stretch, least_stretch, path_limits
 from planner.timing.profiles.cubic import cubic
-from planner.timing.profiles.jerk_bound import with_jerk_bound
+from planner.timing.profiles.jerk_bound import jerk_bounded
 from planner.timing.profiles.ruckig_pieces import pieces
-from planner.timing.profiles.time_optimal import time_optimal
 from planner.timing.time_law import TimeLaw
 
 _ROUNDING = 1e-9
@@ -27,7 +26,7 @@ def jerk_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> Time
     if slowed <= 1.0 + _ROUNDING:
         return law
     try:
-        other = with_jerk_bound(boom, path, time_optimal(boom, path, base), base)
+        other = jerk_bounded(boom, path, base)
     except InfeasibleError:  # a drive cannot hold the load: no law mends it, and the checks say so
         return law
     return min(law, other, key=lambda each: each.duration)

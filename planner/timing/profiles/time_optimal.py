@@ -43,7 +43,13 @@ _TRIES = 10
 _Rows = tuple[Array, Array, Array]
 
 
-def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, intervals: int = GRID_INTERVALS) -> TimeLaw:
+def time_optimal(
+    boom: Boom,
+    path: Path,
+    base: BaseMotion | None = None,
+    intervals: int = GRID_INTERVALS,
+    jerk_share: float | None = None,
+) -> TimeLaw:
     """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
 
     The path acceleration is constant over each of the `intervals` steps in s, and the conditions hold at both ends of each
@@ -56,12 +62,18 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
     speeds of the solve before, until that adds nothing where a limit is met. Every solve keeps the true limits. The tangents
     settle on a rough grid, from which the full one starts.
 
+    Args:
+        jerk_share: the share of the joints' jerk limits that |p'''| s'^3 may take, the part that the path's shape asks for;
+            None holds it to no limit.
+
     Raises:
         InfeasiblePathError: no law keeps the limits, or a drive could not stop and hold its load somewhere;
             names the joint, the place, the demand and the limit.
     """
     s = spread(path, intervals)
     demands = path_dynamics(boom, path, s, base)
+    if jerk_share is not None:
+        demands = replace(demands, cap=jerk_share ** (2.0 / 3.0) * _shape_cap(boom, path, s))
     if (demands.static_ratio > 1.0).any():  # a swing might carry the load past such a place, but could not stop at it
         raise explain_infeasible(demands)
     unit = _time_scale(demands)
@@ -75,6 +87,15 @@ def time_optimal(boom: Boom, path: Path, base: BaseMotion | None = None, interva
     if found is None:
         raise explain_infeasible(demands)
     return _law(s, found) if isinstance(path, JointLine) else _repaired(demands, found, unit)
+
+
+def _shape_cap(boom: Boom, path: Path, s: Array) -> Array:
+    """(n,) the largest x at which |p'''| x^(3/2) keeps the jerk limits in the steps on either side of s (n,)."""
+    bend = (np.abs(path((s[1:] + s[:-1]) / 2.0, 3)) / boom.limits.jerk).max(axis=1)
+    beside = np.maximum(np.append(bend, 0.0), np.append(0.0, bend))
+    with np.errstate(divide="ignore"):
+        cap: Array = beside ** (-2.0 / 3.0)
+    return cap
 
 
 def _repaired(demands: PathDynamics, found: "_Found", unit: float) -> TimeLaw:
@@ -136,7 +157,8 @@ def _time_scale(demands: PathDynamics) -> float:
     """[s] of the order of the least duration: the solver wants units in which s' and s'' are of order one."""
     boom = demands.boom
     pushed = np.abs(demands.p1) / boom.limits.acceleration, np.abs(demands.a) / static_limits(boom)
-    return float(np.sqrt(max((1.0 / demands.x_max).max(), *(part.max() for part in pushed))))
+    fastest = float((np.abs(demands.p1) / boom.limits.velocity).max())
+    return max(fastest, *(float(np.sqrt(part.max())) for part in pushed))
 
 
 def _iterate(demands: PathDynamics, path: Path, x: Array, unit: float) -> _Found | None:
