@@ -32,8 +32,9 @@ from boom_model.link_design import (
     with_body,
 )
 from boom_model.link_design.beam import Forces
-from boom_model.link_design.exact import buckling_load, pressed
+from boom_model.link_design.exact import buckling_load
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
+from boom_model.link_design.search import pressed
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
 from planner.checks.rows import Verdict
 from planner.links.loads import largest_components, link_cases, thesis_load
