@@ -73,7 +73,7 @@ def solve(problem: Problem, near: Array | None = None) -> Optimum:
     """
     p = problem
     check_feasible(p)
-    unit = near_answer(p) if near is None else np.clip(near, p.lower, p.upper)
+    unit = _guess(p) if near is None else np.clip(near, p.lower, p.upper)
     best, value, lower_bound = None, np.inf, -np.inf
     smoothed = p.column is not None and p.column.smoothing > 0.0
     for smooth in [True, False] if smoothed else [False] * _MOST_TRIES:
@@ -82,15 +82,16 @@ def solve(problem: Problem, near: Array | None = None) -> Optimum:
         kept = _repaired(p, unit)
         if kept is not None and p.cost @ kept < value and (smooth or best is None or not smoothed):
             best, value = kept, float(p.cost @ kept)
-        lower_bound = max(lower_bound, dual_value(p, multipliers, value))
-        if value - lower_bound <= GAP * value:
-            break
+        if best is not None:
+            lower_bound = max(lower_bound, dual_value(p, multipliers, value))
+            if value - lower_bound <= GAP * value:
+                break
     if best is None:
         raise InfeasibleError("the least mass was not found: the solver of its conic program does not converge")
     return Optimum(best, multipliers, lower_multipliers(p, multipliers), value, lower_bound)
 
 
-def near_answer(p: Problem) -> Array:
+def _guess(p: Problem) -> Array:
     """Guess heights: one multiplier for all deflections, such that these hold, then the tapers."""
     low, high = -30.0, 30.0
     for _ in range(40):
@@ -177,7 +178,7 @@ def _by_clarabel(p: Problem, unit: Array, smooth: bool) -> tuple[Array, Multipli
     the axial load of its body force at the stations, and a symmetric (2, 2) matrix at each joint.
     """
     from clarabel import NonnegativeConeT, SecondOrderConeT
-    from scipy.sparse import csc_matrix, diags_array
+    from scipy.sparse import csc_matrix, diags_array, triu
 
     n, d = p.cost.size, len(p.bending)
     bending, shear = p.bending / unit**3, p.shear / unit
@@ -220,7 +221,8 @@ def _by_clarabel(p: Problem, unit: Array, smooth: bool) -> tuple[Array, Multipli
         if smooth and p.column is not None:
             size = np.sqrt(p.column.smoothing) * unit / unit.mean()
             bend = diags_array([size[:-2], -2.0 * size[1:-1], size[2:]], offsets=[0, 1, 2], shape=(n - 2, program.size))
-            quadratic = csc_matrix(bend.T @ bend)
+            quadratic = csc_matrix(triu(bend.T @ bend))
+            quadratic.sort_indices()
     x, dual = program.solve(np.concatenate([p.cost * unit / worth, np.zeros(program.size - n)]), quadratic)
     dual = worth * dual
     slope, constant = np.zeros(n), 0.0
