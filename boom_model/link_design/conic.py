@@ -75,9 +75,13 @@ def solve(problem: Problem, near: Array | None = None) -> Optimum:
     check_feasible(p)
     unit = _guess(p) if near is None else np.clip(near, p.lower, p.upper)
     best, value, lower_bound = None, np.inf, -np.inf
+    multipliers: Multipliers | None = None
     smoothed = p.column is not None and p.column.smoothing > 0.0
     for smooth in [True, False] if smoothed else [False] * _MOST_TRIES:
-        heights, multipliers = _by_clarabel(p, unit, smooth)
+        heights, found = _by_clarabel(p, unit, smooth)
+        if not np.isfinite(heights).all():
+            break
+        multipliers = found
         unit = np.clip(heights, p.lower, p.upper)
         kept = _repaired(p, unit)
         if kept is not None and p.cost @ kept < value and (smooth or best is None or not smoothed):
@@ -86,7 +90,7 @@ def solve(problem: Problem, near: Array | None = None) -> Optimum:
             lower_bound = max(lower_bound, dual_value(p, multipliers, value))
             if value - lower_bound <= GAP * value:
                 break
-    if best is None:
+    if best is None or multipliers is None:
         raise InfeasibleError("the least mass was not found: the solver of its conic program does not converge")
     return Optimum(best, multipliers, lower_multipliers(p, multipliers), value, lower_bound)
 

@@ -29,8 +29,8 @@ from boom_model.link_design.problem import Column, Problem, lower_multipliers, s
 
 _SMOOTHING = 5e-4
 """Cost of a wave of the heights, as long as a column's element and as high as their mean, relative
-to the cost of the link. The elements do not see such waves. Without this cost, heights that buckling
-decides swing by half of their size, for a ten-millionth of the mass."""
+to the cost of the link. The elements hardly see such waves. Without this cost, heights that buckling
+decides swing by a third of their size within an element, for less than a millionth of the mass."""
 
 _LEAST_PRICE = 0.01
 """Least price of a height, relative to its mass"""
