@@ -41,8 +41,8 @@ def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | Non
     window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
     makes the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is not the optimum.
 
-    The limits are looked at in few places of each of the law's pieces, with torques interpolated along the path: between these places the
-    law may break them by a trifle.
+    The limits are looked at in few places of each of the law's pieces, with torques interpolated along the path: between
+    these places the law may break them by a trifle.
     """
     from scipy.optimize import minimize_scalar
 
