@@ -215,13 +215,13 @@ class PathLoads:
         demands = path_dynamics(boom, path, s, base)
         return PathLoads(boom, path, CubicSpline(s, np.stack([demands.a, demands.b, demands.c], axis=1)))
 
-    def least_stretch(self, law: TimeLaw, t: Array) -> float:
-        """As the function `least_stretch`, at times t (n,) of a law."""
+    def stretch(self, law: TimeLaw, t: Array, floor: float) -> float:
+        """The least factor from `floor` on by which a law must be slowed to keep the limits at times t (n,)."""
         s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
         s, v, u = np.clip(s, 0.0, 1.0), v[:, None], u[:, None]
         p1 = self.path(s, 1)
         qd, qdd = p1 * v, p1 * u + self.path(s, 2) * v**2
-        least = _joint_stretch(self.boom, qd, qdd)
+        least = max(floor, _joint_stretch(self.boom, qd, qdd))
         if not limited_by_drives(self.boom):
             return least
         a, b, c = np.moveaxis(self.torques(s), 1, 0)

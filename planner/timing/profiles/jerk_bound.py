@@ -53,7 +53,7 @@ def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | Non
         smoothed = law.averaged(law.duration * 10.0**exponent)
         motion = Motion(path, smoothed)
         jerk = float(np.cbrt(rate_ratios(boom, motion, motion.times(1))[2]))
-        return smoothed.stretched(max(1.0, jerk, loads.least_stretch(smoothed, smoothed.s.x)))
+        return smoothed.stretched(loads.stretch(smoothed, smoothed.s.x, max(1.0, jerk)))
 
     exponents = np.linspace(_NARROWEST, 0.0, _WINDOWS)
     least = int(np.argmin([smooth(float(exponent)).duration for exponent in exponents]))
