@@ -24,11 +24,11 @@ from planner.timing.roots import just_kept
 from planner.timing.time_law import Motion, TimeLaw
 
 if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
+    from scipy.interpolate import BSpline
 
 _FINITE = 1e12
 _LEAST_SHARE = 1e-6
-_SLOPES = 20_000
+_SLOPES = 20_001
 _BETWEEN = 20
 _ROUNDING = 1e-9
 _LOAD_INTERVALS = 500
@@ -199,29 +199,32 @@ def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None 
 
 @dataclass(frozen=True, eq=False)
 class PathLoads:
-    """A path's torques a u + b x + c, interpolated along it: for a search that asks for them many times."""
+    """A path's torques a u + b x + c, interpolated along it: for a search that asks for them many times.
+
+    Linearly: beside a waypoint they can jump, and anything smoother overshoots there.
+    """
 
     boom: Boom
     path: Path
-    torques: "CubicSpline"
+    torques: "BSpline"
     """s to (3, 5): a, b and c"""
 
     @staticmethod
     def along(boom: Boom, path: Path, base: BaseMotion | None = None) -> "PathLoads":
         """The loads of a path on a base that is tilted at most."""
-        from scipy.interpolate import CubicSpline
+        from scipy.interpolate import make_interp_spline
 
         s = spread(path, _LOAD_INTERVALS)
         demands = path_dynamics(boom, path, s, base)
-        return PathLoads(boom, path, CubicSpline(s, np.stack([demands.a, demands.b, demands.c], axis=1)))
+        return PathLoads(boom, path, make_interp_spline(s, np.stack([demands.a, demands.b, demands.c], axis=1), k=1))
 
-    def least_stretch(self, law: TimeLaw, t: Array) -> float:
-        """As the function `least_stretch`, at times t (n,) of a law."""
+    def stretch(self, law: TimeLaw, t: Array, floor: float) -> float:
+        """The least factor from `floor` on by which a law must be slowed to keep the limits at times t (n,)."""
         s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
         s, v, u = np.clip(s, 0.0, 1.0), v[:, None], u[:, None]
         p1 = self.path(s, 1)
         qd, qdd = p1 * v, p1 * u + self.path(s, 2) * v**2
-        least = _joint_stretch(self.boom, qd, qdd)
+        least = max(floor, _joint_stretch(self.boom, qd, qdd))
         if not limited_by_drives(self.boom):
             return least
         a, b, c = np.moveaxis(self.torques(s), 1, 0)
@@ -307,7 +310,8 @@ def path_limits(boom: Boom, path: Path) -> tuple[float, float, float]:
 
     On a straight path they bound the first, second and third time derivative of s.
     """
-    step = np.abs(path(spread(path, 1 if isinstance(path, JointLine) else _SLOPES), 1)).max(axis=0)
+    points = np.linspace(0.0, 1.0, 1 if isinstance(path, JointLine) else _SLOPES)
+    step = np.abs(path(points, 1)).max(axis=0)
     limits = boom.limits
     with np.errstate(divide="ignore"):
         velocity, acceleration, jerk = (
