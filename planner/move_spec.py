@@ -173,9 +173,9 @@ class MoveWords:
         Raises:
             InputError: a word is not known, a number is malformed or out of range, or options contradict each other.
         """
-        if self.via_velocity and len(self.via_velocity) != len(self.via):
-            raise InputError(f"{len(self.via_velocity)} --via-velocity for {len(self.via)} --via; give one for each")
         velocities = [parse_joint_velocity(text) for text in self.via_velocity]
+        if velocities and len(velocities) != len(self.via):
+            raise InputError(f"via velocity: {len(velocities)} given for {len(self.via)} via; give one for each")
         return MoveSpec.of(
             self.start,
             self.goal,

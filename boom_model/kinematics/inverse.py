@@ -159,7 +159,7 @@ def _overloads(boom: Boom, q: Array) -> list[str]:
     held = np.abs(gravity_torque(boom, q))
     limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
     return [
-        f"{joint} must constraint {torque:.4g} Nm, and its drive allows {float(limit):.4g} Nm"
+        f"{joint} must hold {torque:.4g} Nm, and its drive allows {float(limit):.4g} Nm"
         for joint, torque, limit in zip(JOINTS, held, limits, strict=True)
         if limit is not None and torque > limit
     ]

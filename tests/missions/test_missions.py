@@ -226,7 +226,7 @@ def test_a_bad_mission_names_file_and_key(mission, steps, said):
         ),
         ('[[steps]]\nto = "phenotyping"\nprofile = "fast"\n', InputError, "steps 1: profile is 'fast'"),
         ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2"]\n', InputError, "steps 1: "),
-        ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2,3,0,0"]\n', InputError, "with 0 waypoints"),
+        ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2,3,0,0"]\n', InputError, "via velocity: 1 given for 0 via"),
         ('[[steps]]\nrepeat = 1\n[[steps.steps]]\nto = "tip=9,0,0"\n', InfeasibleError, "steps 1, steps 1: tip"),
         ('[[steps]]\nto = "tip=1.4,0,1.0"\nalong = "line"\n', InfeasibleError, "steps 1: "),
         ("[[steps]]\nrepeat = 100001\n[[steps.steps]]\nhold_s = 1\n", InputError, "more than 100,000 steps"),
@@ -239,8 +239,10 @@ def test_a_step_that_cannot_be_done_is_named(mission, steps, kind, said):
 
 
 def test_a_line_from_another_branch_is_refused(mission):
-    steps = '[[steps]]\nto = "tip=1,1.7,0.9"\nhold = "extension=0.6"\n[[steps]]\nto = "tip=-1,1.7,0.9"\nalong = "line"\n'
-    with pytest.raises(InfeasibleError, match=r"steps 2: the line starts at another joint position .* same pitch and hold"):
+    steps = '[[steps]]\nto = "tip=1,1.7,0.9"\nconstraint = "extension=0.6"\n[[steps]]\nto = "tip=-1,1.7,0.9"\nalong = "line"\n'
+    with pytest.raises(
+        InfeasibleError, match=r"steps 2: the line starts at another joint position .* same pitch and constraint"
+    ):
         plan_cycle(BOOM, mission(steps))
 
 

@@ -414,7 +414,7 @@ def test_reach_is_recorded_by_the_command(tmp_path: Path, monkeypatch: pytest.Mo
     assert nothing.titles()["/world"].endswith("; no point reachable with constraint extension=5 m, pitch -90 deg")
     capsys.readouterr()
     assert boom(monkeypatch, *at_rest, "--pitch", "free") == 2
-    assert capsys.readouterr().err == "boom: pitch free: the reach is drawn for one pitch\n"
+    assert capsys.readouterr().err == "boom: pitch free: the workspace is drawn for one pitch\n"
 
 
 def test_one_package_knows_rerun():
