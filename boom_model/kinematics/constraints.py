@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, checked, read_only
 from boom_model.boom import Boom
-from boom_model.drives.drive import drive_torque_limit
+from boom_model.drives.limits import static_limits
 from boom_model.dynamics.equations_of_motion import gravity_torque
 from boom_model.errors import InputError
 from boom_model.words import joint_position, number
@@ -97,12 +97,11 @@ class LeastTorque:
         Raises:
             InputError: no joint has a drive with a torque limit.
         """
-        limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
-        driven = [i for i, limit in enumerate(limits) if limit is not None]
-        if not driven:
+        limits = static_limits(boom)
+        driven = np.isfinite(limits)
+        if not driven.any():
             raise InputError(f"constraint {self}: no joint of {boom.name} has a drive to measure torques by")
-        allowed = np.array([float(limit) for limit in limits if limit is not None])
-        ratio: Array = np.max(np.abs(gravity_torque(boom, q)[..., driven]) / allowed, axis=-1)
+        ratio: Array = np.max(np.abs(gravity_torque(boom, q)[..., driven]) / limits[driven], axis=-1)
         return ratio
 
 

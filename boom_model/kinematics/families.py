@@ -17,12 +17,12 @@ import numpy as np
 
 from boom_model.arrays import Array, Mask
 from boom_model.boom import Boom
+from boom_model.golden_section import golden_section
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension, turned_into_limits
 from boom_model.kinematics.constraints import ChoosingConstraint, LeastExtension, NearestHorizontal
 
 _SCAN = 64
 _REFINEMENTS = 60
-_SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 class Targets(NamedTuple):
@@ -32,6 +32,24 @@ class Targets(NamedTuple):
     F: Array
     G: Array
     phi: Array
+
+
+def targets_at(boom: Boom, position: Array, pitch: Array | float, side: Array | float) -> Targets:
+    """Return the targets of tip positions (..., 3) at pitches (...), on a side of the base.
+
+    Args:
+        boom: the boom.
+        position: of the tip in frame 1 [m].
+        pitch: [rad]
+        side: 1 where the yaw points towards the tip, -1 where the arm reaches over the base; it broadcasts.
+    """
+    g = boom.geometry
+    x, y, z = np.moveaxis(position, -1, 0)
+    F = side * np.hypot(x, y) - g.L2 - g.L8 * np.cos(pitch)
+    G = z - g.L1 - g.L8 * np.sin(pitch)
+    theta1 = np.arctan2(y, x) + np.where(np.asarray(side) < 0.0, np.pi, 0.0)
+    theta1, G, phi = (np.broadcast_to(each, F.shape) for each in (theta1, G, np.asarray(pitch) - np.pi / 2.0))
+    return Targets(theta1, F, G, phi)
 
 
 def member(boom: Boom, targets: Targets, theta2: Array) -> Array:
@@ -122,14 +140,12 @@ def _inside(
     costs = _cost(boom, constraint, member(boom, theirs, scan))
     at = np.clip(np.argmin(costs, axis=-1), 1, _SCAN - 1)
     pick = np.arange(row.size)
-    a, b = scan[pick, at - 1], scan[pick, at + 1]
-    for _ in range(_REFINEMENTS):  # golden section, on all intervals at once
-        c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
-        values = _cost(boom, constraint, member(boom, theirs, np.stack([c, d], axis=-1)))
-        left = values[:, 0] <= values[:, 1]
-        a, b = np.where(left, a, c), np.where(left, d, b)
-    found = ((a + b) / 2.0)[:, None]
-    values = _cost(boom, constraint, member(boom, theirs, found))[:, 0]
+
+    def costs_at(theta2: Array) -> Array:
+        return _cost(boom, constraint, member(boom, theirs, theta2))
+
+    found = golden_section(costs_at, scan[pick, at - 1], scan[pick, at + 1], _REFINEMENTS)[:, None]
+    values = costs_at(found)[:, 0]
     order = np.argsort(values)[::-1]  # the least of a row is written last
     better = order[values[order] < cost[row[order]]]
     best, cost = best.copy(), cost.copy()

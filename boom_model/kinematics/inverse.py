@@ -7,9 +7,10 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.boom import JOINTS, Boom
-from boom_model.drives.drive import drive_torque_limit
+from boom_model.drives.limits import static_limits
 from boom_model.dynamics.equations_of_motion import gravity_torque
 from boom_model.errors import InfeasibleError, InputError
+from boom_model.golden_section import golden_section
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension, turned_into_limits
 from boom_model.kinematics.constraints import (
     ChoosingConstraint,
@@ -20,11 +21,10 @@ from boom_model.kinematics.constraints import (
     measure,
     parse_constraint,
 )
-from boom_model.kinematics.families import Targets, best_member
+from boom_model.kinematics.families import Targets, best_member, targets_at
 
 _PITCHES = 360
 _REFINEMENTS = 40
-_SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
 _CHUNK = 20_000  # targets at once under a choosing constraint, whose scan takes some 10 kB a target
 
 
@@ -157,11 +157,10 @@ def _solution(boom: Boom, q: Array, note: tuple[str, ...] = ()) -> Solution:
 
 def _overloads(boom: Boom, q: Array) -> list[str]:
     held = np.abs(gravity_torque(boom, q))
-    limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
     return [
-        f"{joint} must hold {torque:.4g} Nm, and its drive allows {float(limit):.4g} Nm"
-        for joint, torque, limit in zip(JOINTS, held, limits, strict=True)
-        if limit is not None and torque > limit
+        f"{joint} must hold {torque:.4g} Nm, and its drive allows {limit:.4g} Nm"
+        for joint, torque, limit in zip(JOINTS, held, static_limits(boom), strict=True)
+        if torque > limit
     ]
 
 
@@ -182,12 +181,7 @@ def _free_pitch(boom: Boom, position: Array, constraint: Constraint) -> float:
     if not np.isfinite(costs[best]):
         return -np.pi / 2.0
     step, middle = turn[1] - turn[0], float(turn[best])
-    a, b = middle - step, middle + step
-    for _ in range(_REFINEMENTS):
-        c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
-        left, right = cost(np.array([c, d]))
-        a, b = (a, d) if left <= right else (c, b)
-    refined = (a + b) / 2.0
+    refined = float(golden_section(cost, np.array(middle - step), np.array(middle + step), _REFINEMENTS))
     return refined if cost(np.array([refined]))[0] <= costs[best] else middle
 
 
@@ -215,14 +209,9 @@ def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, constraint
 
 def _branches(boom: Boom, x: Array, y: Array, z: Array, pitch: Array, constraint: Constraint) -> Branches:
     side = np.array([1.0, -1.0])
-    g, radius = boom.geometry, np.hypot(x, y)[..., None]
-    targets = Targets(
-        theta1=np.arctan2(y, x)[..., None] + np.where(side < 0.0, np.pi, 0.0),
-        F=side * radius - g.L2 - g.L8 * np.cos(pitch)[..., None],
-        G=np.repeat((z - g.L1 - g.L8 * np.sin(pitch))[..., None], 2, axis=-1),
-        phi=np.repeat((pitch - np.pi / 2.0)[..., None], 2, axis=-1),
-    )
-    distinct = (side > 0.0) | (radius > 0.0)
+    position = np.stack([x, y, z], axis=-1)[..., None, :]
+    targets = targets_at(boom, position, pitch[..., None], side)
+    distinct = (side > 0.0) | (np.hypot(x, y)[..., None] > 0.0)
     if isinstance(constraint, FixingConstraint):
         q, exists = _constrained(boom, targets, constraint, distinct)
     else:

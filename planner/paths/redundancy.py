@@ -24,10 +24,11 @@ import numpy as np
 
 from boom_model import Boom, inverse_dynamics
 from boom_model.arrays import Array, Mask
-from boom_model.drives.drive import drive_inertia, drive_torque_limit
+from boom_model.drives.limits import rotors, static_limits
+from boom_model.golden_section import golden_section
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension
 from boom_model.kinematics.constraints import ChoosingConstraint, LeastTime
-from boom_model.kinematics.families import Targets, best_member, member
+from boom_model.kinematics.families import Targets, best_member, member, targets_at
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -47,7 +48,6 @@ _WEIGHTS = (300.0, 30.0, 3.0, 0.3, 0.03, 0.0)
 _NEWTON_STEPS = 25
 _FIXED = 41
 _BISECTIONS = 30
-_SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
 _SIMPLE = 3
 """Simple curves of a side, the quickest, from which a quick one is looked for."""
 
@@ -80,12 +80,7 @@ class Side:
 
     def targets_at(self, points: Array) -> Targets:
         """The self-motion's targets (n,) at tip positions (n, 3)."""
-        g, side = self.boom.geometry, 1.0 if self.front else -1.0
-        x, y, z = np.moveaxis(points, -1, 0)
-        F = side * np.hypot(x, y) - g.L2 - g.L8 * np.cos(self.pitch)
-        G = z - g.L1 - g.L8 * np.sin(self.pitch)
-        theta1 = np.arctan2(y, x) + (0.0 if self.front else np.pi)
-        return Targets(theta1, F, G, np.full_like(F, self.pitch - np.pi / 2.0))
+        return targets_at(self.boom, points, self.pitch, 1.0 if self.front else -1.0)
 
     @cached_property
     def grid(self) -> Array:
@@ -187,14 +182,12 @@ class Side:
     def wished(self, constraint: ChoosingConstraint, theta2: Array, lower: Array, upper: Array) -> Array:
         """The constraint's best member (NODES,) within a cell of a curve and its corridor, by golden section."""
         cell = self.grid[1] - self.grid[0]
-        a, b = np.clip(theta2 - cell, lower, upper), np.clip(theta2 + cell, lower, upper)
-        for _ in range(_BISECTIONS):
-            c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
-            cost = constraint.cost(self.boom, self.at(np.stack([c, d], axis=-1)))
-            left = cost[:, 0] <= cost[:, 1]
-            a, b = np.where(left, a, c), np.where(left, d, b)
-        best: Array = (a + b) / 2.0
-        return best
+
+        def cost(theta2: Array) -> Array:
+            return constraint.cost(self.boom, self.at(theta2))
+
+        low, high = np.clip(theta2 - cell, lower, upper), np.clip(theta2 + cell, lower, upper)
+        return golden_section(cost, low, high, _BISECTIONS)
 
     def fixed(self) -> Array:
         """Curves (k, NODES) of fixed elevation or fixed extension that stay within the limits all along."""
@@ -265,16 +258,9 @@ class Side:
 
 def _rows(boom: Boom, T: float) -> list[tuple[Array, Array]]:
     """Difference matrices of the first three derivatives, each with the joints' limits at duration T."""
-    D1 = _difference()
     limits = boom.limits
-    D2 = np.diff(np.eye(NODES), 2, axis=0) * (NODES - 1) ** 2
-    D3 = np.diff(np.eye(NODES), 3, axis=0) * (NODES - 1.0) ** 3
+    D1, D2, D3 = (np.diff(np.eye(NODES), order, axis=0) * (NODES - 1.0) ** order for order in (1, 2, 3))
     return [(D1, limits.velocity * T), (D2, limits.acceleration * T**2), (D3, limits.jerk * T**3)]
-
-
-def _difference() -> Array:
-    D: Array = np.diff(np.eye(NODES), axis=0) * (NODES - 1.0)
-    return D
 
 
 def durations(boom: Boom, q: Array) -> Array:
@@ -325,12 +311,10 @@ def travel_time(boom: Boom, q: Array) -> Array:
     still, pushed, carried = (
         inverse_dynamics(boom, q, qd, qdd, reactions=False).tau for qd, qdd in ((zero, zero), (zero, d1), (d1, d2))
     )
-    rotors = np.array([drive_inertia(drive) if drive else 0.0 for drive in boom.drives])
-    known = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
-    drives = np.array([np.inf if limit is None else float(limit) for limit in known])
+    inertia, drives = rotors(boom), static_limits(boom)
     driven = np.isfinite(drives)
-    A = np.concatenate([d1, (pushed - still + rotors * d1)[..., driven]], axis=-1)
-    B = np.concatenate([d2, (carried - still + rotors * d2)[..., driven]], axis=-1)
+    A = np.concatenate([d1, (pushed - still + inertia * d1)[..., driven]], axis=-1)
+    B = np.concatenate([d2, (carried - still + inertia * d2)[..., driven]], axis=-1)
     C = np.concatenate([zero, still[..., driven]], axis=-1)
     L = np.concatenate([boom.limits.acceleration, drives[driven]])
     possible = (np.abs(C) < L).all(axis=(-2, -1))

@@ -18,6 +18,7 @@ from boom_model import (
     solve_branches,
 )
 from boom_model.arrays import Array, Mask, checked, scalar
+from planner.bisection import bisect
 from planner.paths.redundancy import NODES, Departure, resolve, sides_of
 from planner.paths.targets import unreachable
 from planner.paths.tip_curves import TipCurve, TipLine
@@ -180,9 +181,7 @@ def _one_branch(boom: Boom, curve: TipCurve, pitch: float, constraint: Constrain
         else:
             return path
     at = ", ".join(f"{x:.4g}" for x in curve(s[broken]))
-    raise InfeasibleError(
-        f"the tip's line forces a flip to another branch under constraint {constraint} at {s[broken]:.1%}, ({at}) m"
-    )
+    raise InfeasibleError(_flip(constraint, s[broken], at))
 
 
 def _leaves(boom: Boom, curve: TipCurve, pitch: float, constraint: Constraint, s: Array, reached: Mask) -> str:
@@ -190,10 +189,10 @@ def _leaves(boom: Boom, curve: TipCurve, pitch: float, constraint: Constraint, s
     out = int(np.argmin(reached))
     if out == 0:
         return f"the tip's line starts out of reach: {unreachable(boom, curve(s[0]), pitch, constraint)}"
-    inside, outside = float(s[out - 1]), float(s[out])
-    for _ in range(_BISECTIONS):
-        middle = (inside + outside) / 2.0
-        within = solve_branches(boom, curve(np.array(middle)), pitch, constraint).within_limits.any()
-        inside, outside = (middle, outside) if within else (inside, middle)
+
+    def within(place: float) -> bool:
+        return bool(solve_branches(boom, curve(np.array(place)), pitch, constraint).within_limits.any())
+
+    inside = bisect(within, float(s[out - 1]), float(s[out]), steps=_BISECTIONS)
     at = ", ".join(f"{x:.6g}" for x in curve(np.array(inside)))
     return f"the tip's line leaves the reach at {inside:.2%}, ({at}) m: {unreachable(boom, curve(s[out]), pitch, constraint)}"

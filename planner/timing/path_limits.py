@@ -12,12 +12,11 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from boom_model import JOINTS, Boom, InfeasibleError, breakdown, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
-from boom_model.drives.drive import drive_inertia, motor_limit
+from boom_model.drives.limits import gear_limits, motor_limits, rotors, static_limits
 from boom_model.dynamics.base_motion import BaseMotion
 from planner.paths.path import JointLine, Path
 from planner.timing.roots import just_kept
@@ -97,11 +96,6 @@ class PathDynamics:
         return held
 
 
-def rotors(boom: Boom) -> Array:
-    """(5,) what the drives' own inertia adds to the motors' share, eta N^2 (J_rotor + J_gear) [kg m^2]."""
-    return np.array([drive_inertia(drive) if drive else 0.0 for drive in boom.drives])
-
-
 def gear_ratio(boom: Boom, tau: Array) -> Array:
     """Joint torques (..., 5) over the gearboxes' start-stop torque; 0 where none is given."""
     ratio: Array = np.abs(tau) / gear_limits(boom)
@@ -120,31 +114,9 @@ def load_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array) -> Array:
     return np.maximum(gear_ratio(boom, tau), motor_ratio(boom, tau, qd, qdd))
 
 
-def gear_limits(boom: Boom) -> Array:
-    """(5,) start-stop torque of the gearboxes [Nm]; infinite where none is given."""
-    limits = [None if drive is None else drive.gearbox.start_stop_torque for drive in boom.drives]
-    return np.array([np.inf if limit is None else limit for limit in limits])
-
-
-def motor_limits(boom: Boom, speed: ArrayLike) -> Array:
-    """`motor_limit` of every joint at joint speeds (..., 5), likewise shaped; infinite where no motor limits."""
-    speed = np.asarray(speed, dtype=float)
-    limits = np.full_like(speed, np.inf)
-    for i, drive in enumerate(boom.drives):
-        limit = None if drive is None else motor_limit(drive, speed[..., i])
-        if limit is not None:
-            limits[..., i] = limit
-    return limits
-
-
 def limited_by_drives(boom: Boom) -> bool:
     """Whether any gearbox or motor limits a torque."""
     return bool(np.isfinite(static_limits(boom)).any())
-
-
-def static_limits(boom: Boom) -> Array:
-    """(5,) torque that motor and gearbox allow at rest [Nm]; infinite where no drive limits."""
-    return np.minimum(gear_limits(boom), motor_limits(boom, np.zeros(5)))
 
 
 def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = None) -> PathDynamics:

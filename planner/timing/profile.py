@@ -52,11 +52,6 @@ class TimingProfile(ABC):
         return Motion(path, self.law(boom, path, base))
 
     @property
-    def limits_jerk(self) -> bool:
-        """Whether the joints' jerk limits are kept."""
-        return False
-
-    @property
     def limits_average_torque(self) -> bool:
         """Whether the gearboxes' average torque is kept."""
         return False
@@ -138,10 +133,6 @@ class JerkLimited(TimingProfile):
         return jerk_limited(boom, path, base)
 
     @property
-    def limits_jerk(self) -> bool:
-        return True
-
-    @property
     def exact_on_lines(self) -> bool:
         return False
 
@@ -169,10 +160,6 @@ class TimeOptimal(TimingProfile):
             return time_optimal(boom, path, base)
         laws = jerk_bounded(boom, path, base), evenly_limited(boom, path, base)[0]
         return min(laws, key=lambda each: each.duration)
-
-    @property
-    def limits_jerk(self) -> bool:
-        return self.jerk_bound
 
     @property
     def limits_average_torque(self) -> bool:

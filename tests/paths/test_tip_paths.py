@@ -8,6 +8,7 @@ import pytest
 from boom_model.arrays import Array
 from boom_model.boom import Boom
 from boom_model.drives.drive import reflected_inertia
+from boom_model.drives.limits import motor_limits, rotors
 from boom_model.dynamics.newton_euler import inverse_dynamics
 from boom_model.errors import InfeasibleError, InputError
 from boom_model.kinematics.constraints import (
@@ -26,7 +27,7 @@ from planner import TipTarget, plan
 from planner.motion.trajectory import sample
 from planner.paths.tip_curves import TipArc, TipLine
 from planner.paths.tip_path import TipPath, follow
-from planner.timing.path_limits import motor_limits, path_dynamics, rotors
+from planner.timing.path_limits import path_dynamics
 from planner.timing.profile import Profile
 
 BOOM = Boom.load()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from boom_model import BoomError, inverse_dynamics
+from boom_model.drives.limits import static_limits
 from planner.checks.certificate import certify
-from planner.timing.path_limits import static_limits
 from tests.limits import worst
 from tests.random_plans import random_plan
 

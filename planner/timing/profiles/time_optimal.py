@@ -15,17 +15,14 @@ from toppra.solverwrapper.cy_seidel_solverwrapper import seidelWrapper
 from boom_model import BaseMotion, Boom
 from boom_model.arrays import Array
 from boom_model.drives.drive import drive_torque_tangent
+from boom_model.drives.limits import gear_limits, motor_limits, rotors, static_limits
 from planner.paths.path import JointLine, Path
 from planner.timing.path_limits import (
     PathDynamics,
     demand_ratios,
     explain_infeasible,
-    gear_limits,
-    motor_limits,
     path_dynamics,
-    rotors,
     spread,
-    static_limits,
 )
 from planner.timing.time_law import TimeLaw
 
