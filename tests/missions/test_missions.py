@@ -9,7 +9,7 @@ import pytest
 from boom_model import Boom, InfeasibleError, InputError, forward_kinematics
 from planner import Cubic, Trajectory, Verdict, check, plan
 from planner.missions.mission import check_cycle, load_mission, named_missions, plan_cycle
-from planner.motion.trajectory import joined
+from planner.motion.trajectory import concatenate
 from planner.motion.vehicle import load_case
 from planner.planning import torques
 from planner.timing.profile import Profile
@@ -66,7 +66,7 @@ def test_a_cycle_is_one_long_motion_without_weights(mission):
     cycle = plan_cycle(BOOM, mission(THERE_AND_BACK))
     assert [leg.label for leg in cycle.legs] == ["to phenotyping", "hold", "to transport", "pause", "to phenotyping"]
     assert cycle.counts.tolist() == [1, 3, 3, 3, 3]
-    whole = joined([cycle.legs[i].trajectory for i in cycle.order])
+    whole = concatenate([cycle.legs[i].trajectory for i in cycle.order])
     assert cycle.duty.duration == pytest.approx(whole.duration, rel=1e-12)
     assert whole.duration == pytest.approx(4.8333 + 3 * (4 + 5 + 6 + 5), abs=1e-3)
     tau, rows = torques(BOOM, whole), check_cycle(BOOM, cycle).rows
