@@ -312,7 +312,7 @@ def test_exports_by_the_command(boom):
         (("export", "move.csv", "move.mat"), "the name of a motion's file must end in"),
         (("export", "none.csv", "move.json"), "none.csv: cannot be read"),
         (("torque", "move.csv", "--out", "tau.txt"), "the name of a motion's file must end in"),
-        (("export-model", "boom.sdf"), "a boom is written as"),
+        (("export-model", "boom.sdf"), "the name of a boom's model must end in"),
         (("check", "move.csv", "--out", "none/x.rrd"), "cannot be written"),
     ],
 )
