@@ -40,8 +40,8 @@ class Outputs:
             inputs: files that the same command reads.
 
         Raises:
-            InputError: two of the files are the same; or a file is read as well, exists and is not a
-                regular file, or has a folder that is missing or not writable.
+            InputError: two of the files are the same; or a file is read as well, exists and is not
+                a regular file, or has a folder that is missing or not writable.
         """
         read = {os.path.realpath(path) for path in inputs if path is not None}
         self._given: dict[Path, str] = {}
@@ -60,7 +60,10 @@ class Outputs:
             pass
 
     def temporary(self, path: str | Path) -> str:
-        """Return the name to write to instead of `path`. Other files in its folder are moved as well."""
+        """Return the name to write to instead of `path`.
+
+        Other files in the folder of that name are moved into place as well.
+        """
         place = Path(os.path.realpath(path))
         return os.path.join(self._folders[place.parent][0], place.name)
 

@@ -1,7 +1,7 @@
 """Description of a move, shared by Python, the command and mission files.
 
-`MoveSpec` describes a move with objects, `MoveWords` with words. The options of the command are made
-from the fields of `MoveWords`, so a new option is described once.
+`MoveSpec` describes a move with objects, `MoveWords` with words. The options of the command are
+made from the fields of `MoveWords`, so a new option is described once.
 """
 
 from collections.abc import Sequence
@@ -71,17 +71,17 @@ class MoveSpec:
                 joint position (5,) [rad, m for the extension], or a TipTarget.
             goal: as `start`.
             via: targets on the way, each as `start`.
-            stop_at_via: whether to stop at them. A cubic with velocities at its waypoints never stops.
+            stop_at_via: whether to stop at them. A cubic with velocities at waypoints never does.
             constraint: "horizontal", "least-torque", "extension=0.25", ..., or a constraint object.
             pitch: "down", "level", "up", degrees as text, or [rad]; "free" or None lets the
                 constraint choose it.
             along: "joint", "line", "arc=X,Y,Z", or a point (3,) [m] on the arc.
             profile: "cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal", or a profile
                 with its options, such as TimeOptimal(jerk_bound=True).
-            duration: [s]; None is the shortest that the limits allow. A longer one slows that motion
-                down uniformly.
-            rate: rate of a controller [Hz]. The samples lie on its clock, and the motion from stop to
-                stop lasts a whole number of its periods. Replaces `step`.
+            duration: [s]; None is the shortest that the limits allow. A longer one slows that
+                motion down uniformly.
+            rate: rate of a controller [Hz]. The samples lie on its clock, and the motion from stop
+                to stop lasts a whole number of its periods. Replaces `step`.
             vehicle: "slope", a FILE.toml, or a vehicle case. Planning accounts for its slope only;
                 checks include track and shock.
             step: longest sampling step [s].
@@ -177,8 +177,8 @@ class MoveWords:
         """Return the move as objects.
 
         Raises:
-            InputError: a word is unknown, a number is malformed or out of range, or options contradict
-                each other.
+            InputError: a word is unknown, a number is malformed or out of range, or options
+                contradict each other.
         """
         velocities = [parse_joint_velocity(text) for text in self.via_velocity]
         if velocities and len(velocities) != len(self.via):

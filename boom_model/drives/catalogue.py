@@ -97,7 +97,11 @@ class _WindingTable(Table):
 
 
 class _MotorTable(Table):
-    """Table of a motor. Phase voltage, temperatures and shaft loads are for readers of the file only."""
+    """Table of a motor.
+
+    No check uses the phase voltage, the temperatures and the shaft loads; they are in the file for
+    its readers.
+    """
 
     source: _Text
     tolerance_percent: Annotated[float, PERCENT] | None = None

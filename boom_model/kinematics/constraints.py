@@ -21,7 +21,7 @@ from boom_model.words import joint_position, number
 
 @dataclass(frozen=True)
 class ActuatorAngle:
-    """Actuator at a fixed elevation above the boom's forward horizontal: theta3 = pi + elevation."""
+    """Actuator at a fixed elevation above the forward horizontal: theta3 = pi + elevation."""
 
     elevation: float
     """[rad]; negative points down."""

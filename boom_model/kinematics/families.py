@@ -1,7 +1,7 @@
 """Family of joint positions that reach a target, and its best member under a choosing constraint.
 
-At a given tip position and pitch the arm has a self-motion of one parameter, theta2. With W = (F, G)
-of `closure` and V = W - L9 e(theta2),
+At a given tip position and pitch the arm has a self-motion of one parameter, theta2.
+With W = (F, G) of `closure` and V = W - L9 e(theta2),
 
     rho = sqrt(|V|^2 - L6^2),   theta3 = angle(-V) - atan2(L6, rho),   theta5 = phi - theta3.
 
@@ -60,7 +60,7 @@ def best_member(boom: Boom, targets: Targets, constraint: ChoosingConstraint) ->
     ends = _ends(boom, targets, constraint)
     at_ends = member(boom, targets, ends)
     best, cost = _least(boom, constraint, at_ends, ends)
-    if not isinstance(constraint, LeastExtension | NearestHorizontal):  # their minimum is at one of the ends
+    if not isinstance(constraint, LeastExtension | NearestHorizontal):  # their minimum is at an end
         best, cost = _inside(boom, targets, constraint, ends, best, cost)
     exists = np.isfinite(cost)
     q = member(boom, targets, best[:, None])[:, 0]
@@ -126,7 +126,7 @@ def _cost(boom: Boom, constraint: ChoosingConstraint, q: Array) -> Array:
 def _inside(
     boom: Boom, targets: Targets, constraint: ChoosingConstraint, ends: Array, best: Array, cost: Array
 ) -> tuple[Array, Array]:
-    """Return theta2 and cost (n,) of the best member, inside the feasible intervals or at an end."""
+    """Return theta2 and cost (n,) of the best member, inside a feasible interval or at its end."""
     middles = (ends[:, 1:] + ends[:, :-1]) / 2.0
     feasible = np.isfinite(_cost(boom, constraint, member(boom, targets, middles))) & (np.diff(ends, axis=-1) > 1e-9)
     row, interval = np.nonzero(feasible)

@@ -56,8 +56,8 @@ class Solution:
     within_limits: bool
     reasons: tuple[str, ...]
     """Position limits that are exceeded, with the excess; drives that cannot hold the static load,
-    payload included; and the value chosen for a joint that the target leaves free. Overloaded drives
-    do not affect `within_limits`."""
+    payload included; and the value chosen for a joint that the target leaves free. Overloaded
+    drives do not affect `within_limits`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,12 +226,14 @@ def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, constraint
     """
     if not isinstance(constraint, Constraint):
         raise InputError(f"constraint is {constraint!r}; it must be one of the constraints of boom_model")
-    position, pitch = checked("position", position, 3) + 0.0, checked("pitch", pitch)  # + 0.0 turns -0.0 into 0.0
+    # Adding 0.0 turns -0.0 into 0.0.
+    position, pitch = checked("position", position, 3) + 0.0, checked("pitch", pitch)
     try:
         x, y, z, pitch = np.broadcast_arrays(*np.moveaxis(position, -1, 0), pitch)
     except ValueError:
         raise InputError(f"shapes do not match: position {position.shape}, pitch {pitch.shape}") from None
-    with np.errstate(over="ignore", invalid="ignore"):  # a target too far for floats is out of reach, not an error
+    # A target so far that floats overflow is out of reach, not an error.
+    with np.errstate(over="ignore", invalid="ignore"):
         return _branches(boom, x, y, z, pitch, constraint)
 
 

@@ -1,23 +1,23 @@
 """Models of the boom for other tools: URDF, and MJCF for MuJoCo.
 
-Links have the frames of the DH tables (`boom_model.kinematics.frames.BODY_FRAMES`). Every joint turns
-about or slides along its own z axis. The five joints keep their names and coordinates.
+Links have the frames of the DH tables (`boom_model.kinematics.frames.BODY_FRAMES`). Every joint
+turns about or slides along its own z axis. The five joints keep their names and coordinates.
 
 MJCF has the linkage as a loop, cut open at pin 7 and closed again by a `connect` constraint:
 
     mount -yaw- base -lower- lower -pin 6- outer
                 base -inner- inner -pin 8- upper -extension- extension -wrist- end_effector - tip
 
-URDF allows trees only. There the loop is cut at pin 8. Two massless links, level_6 and level_7, stay
-parallel to the base. Thus each of the pins 6 and 7 consists of two joints, each of which follows a
-single joint:
+URDF allows trees only. There the loop is cut at pin 8. Two massless links, level_6 and level_7,
+stay parallel to the base. Thus each of the pins 6 and 7 consists of two joints, each of which
+follows a single joint:
 
     mount -yaw- base -inner- inner
                 base -lower- lower -pin 6- outer -pin 7- upper -extension- extension -wrist- end_effector - tip
 
-Let G be the matrix of the <mimic> multipliers, so that the tree's coordinates are x = G q. The joint
-torques of the linkage are tau = G^T tau_tree: a torque that a tool computes for a mimic joint belongs
-to the joint that it mimics.
+Let G be the matrix of the <mimic> multipliers, so that the tree's coordinates are x = G q. The
+joint torques of the linkage are tau = G^T tau_tree: a torque that a tool computes for a mimic joint
+belongs to the joint that it mimics.
 
 The solids along the links are for display only; their thickness is not that of the boom.
 """
@@ -45,7 +45,7 @@ UNLIMITED_EFFORT = 1e6
 FORMS = (".urdf", ".xml")
 
 _STEEL = 7850.0  # [kg/m^3], density of the ball that is drawn for the payload
-_DRAWN = "The solids are for display only. Masses, centres of mass and inertias are those of the boom."
+_DRAWN = "The solids are for display and not measured. Masses, centres of mass and inertias are those of the boom."
 _COLORS = {
     "base": (0.60, 0.60, 0.60),
     "lower": (0.94, 0.89, 0.26),
@@ -76,14 +76,14 @@ def urdf(boom: Boom) -> str:
     """Return the boom as URDF, a tree in which mimic joints represent the parallelogram.
 
     Position and velocity limits are those of the boom. An effort limit is the torque that the drive
-    allows at rest with its margin, or UNLIMITED_EFFORT without a drive. Each of the five joints has a
-    transmission, so Drake and ros_control treat it as an actuator. Its ratio is 1, because efforts
-    are joint torques. URDF cannot represent the coupled limit of lower - inner or the reflected
-    inertia of the drives.
+    allows at rest with its margin, or UNLIMITED_EFFORT without a drive. Each of the five joints has
+    a transmission, so Drake and ros_control treat it as an actuator. Its ratio is 1, because
+    efforts are joint torques. URDF cannot represent the coupled limit of lower - inner or the
+    reflected inertia of the drives.
     """
     top = Element("robot", name=boom.name)
     for text in (
-        "URDF cannot represent a loop. The linkage is cut open at pin 8, between the inner and the upper link. The massless "
+        "URDF cannot close a loop. The linkage is cut open at pin 8, between the inner and the upper link. The massless "
         "links level_6 and level_7 stay parallel to the base, because the joints at pins 6 and 7 mimic lower and inner.",
         "A torque that a tool computes for a mimic joint belongs to the joint it mimics: add it there, times the multiplier.",
         f"URDF cannot represent the coupled limit: lower - inner is at least {boom.limits.linkage:.6g} rad.",
@@ -105,10 +105,10 @@ def urdf(boom: Boom) -> str:
 def mjcf(boom: Boom) -> str:
     """Return the boom as MJCF, with its loop closed at pin 7 by a `connect` constraint.
 
-    Each joint has a motor, whose control is the joint torque [Nm, N for the extension]. If the joint
-    has a drive, the control is limited to what the drive allows at rest with its margin, and the
-    armature is the drive's reflected inertia. Named poses are keyframes, with their static torques as
-    controls.
+    Each joint has a motor, whose control is the joint torque [Nm, N for the extension]. If the
+    joint has a drive, the control is limited to what the drive allows at rest with its margin, and
+    the armature is the drive's reflected inertia. Named poses are keyframes, with their static
+    torques as controls.
 
     The parallelogram has a second, crossed configuration, which it can enter where it is flat. The
     coupled limit prevents this at lower = inner. Nothing prevents it at lower - inner = 180 deg.
@@ -138,8 +138,8 @@ def mjcf(boom: Boom) -> str:
     equality = SubElement(top, "equality")
     # The stiffest constraint in MuJoCo: it lets through 1e-4 of the acceleration that it prevents.
     stiff = {"solref": "0.002 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
-    # Bodies and an anchor, because Drake ignores sites. The anchor is in the frame of body1. MuJoCo finds
-    # its position in body2 with all joints at 0, where the loop is closed.
+    # Bodies and an anchor, because Drake ignores sites. The anchor is in the frame of body1. MuJoCo
+    # finds its position in body2 with all joints at 0, where the loop is closed.
     pin = {"body1": "outer", "body2": "upper", "anchor": _text((boom.geometry.L4, 0.0, 0.0))}
     SubElement(equality, "connect", {**pin, **stiff}, name="pin_7")
     actuators = SubElement(top, "actuator")
@@ -236,7 +236,7 @@ def _body(boom: Boom, link: str) -> Body | None:
 
 
 def _range(boom: Boom, row: tuple[float, ...]) -> tuple[float, float]:
-    """Return the range of the coordinate row . q within the position limits and the coupled limit."""
+    """Return the range of the coordinate row . q within the position and coupled limits."""
     ends = np.array(row) * np.stack([boom.limits.lower, boom.limits.upper])
     low, high = float(ends.min(axis=0).sum()), float(ends.max(axis=0).sum())
     if row[1] * row[2] < 0.0:  # between the two link directions
@@ -364,7 +364,10 @@ def _urdf_transmission(top: Element, joint: str) -> None:
 
 
 def _rpy(R: Array) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 at a pitch of +-90 deg."""
+    """Return roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    At a pitch of +-90 deg, yaw is 0.
+    """
     across = np.hypot(R[0, 0], R[1, 0])
     pitch = float(np.arctan2(-R[2, 0], across))
     if across < 1e-9:
@@ -398,7 +401,8 @@ def _mjcf_body(element: Element, boom: Boom, link: _Link) -> None:
     if body is not None and body.mass > 0.0:
         principal = np.diag(body.inertia)
         inertia = {"diaginertia": _text(principal)}
-        if (body.inertia != np.diag(principal)).any():  # MuJoCo diagonalises a full tensor, which must be positive definite
+        if (body.inertia != np.diag(principal)).any():
+            # MuJoCo diagonalises a full tensor, which must be positive definite.
             inertia = {"fullinertia": _text(body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])}
         SubElement(element, "inertial", inertia, pos=_text(body.com), mass=_text(body.mass))
     drawn = {"rgba": _text((*_COLORS[link.name], 1.0)), "contype": "0", "conaffinity": "0", "group": "2", "mass": "0"}

@@ -1,7 +1,7 @@
 """Duty cycle of moves, holds and pauses: from a TOML file to the samples that are checked.
 
-In a **hold** the arm is at rest with the motors on. In a **pause** the brakes hold, and the motors of
-the joints that have a brake are off. A move may occur many times in a cycle. It is planned and
+In a **hold** the arm is at rest with the motors on. In a **pause** the brakes hold, and the motors
+of the joints that have a brake are off. A move may occur many times in a cycle. It is planned and
 sampled once, with the number of its occurrences.
 """
 
@@ -252,7 +252,7 @@ def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase = LEVEL, step:
     if len(steps) > _MOST_STEPS:
         raise InputError(f"mission {mission.name}: more than {_MOST_STEPS:,} steps")
     for where, part in track(steps):
-        key = (id(part), tuple(np.round(q, _DECIMALS) + 0.0))  # a cycle returns to a position up to rounding
+        key = (id(part), tuple(np.round(q, _DECIMALS) + 0.0))  # positions return up to rounding
         if key not in known:
             try:
                 leg, after, said = _leg(boom, part, q, vehicle, step)

@@ -56,7 +56,8 @@ def write_motion(trajectory: Trajectory, path: str | Path, tau: Array | None = N
     """Write a motion in the form of the file's ending, with its torques (n, 5) if given.
 
     Raises:
-        InputError: the ending is none of FORMS, the file cannot be written, or as `write_joint_trajectory`.
+        InputError: the ending is none of FORMS, the file cannot be written, or as
+            `write_joint_trajectory`.
     """
     form = form_of(path)
     if form == ".csv":
@@ -101,7 +102,7 @@ def read_quantities(path: str | Path, *, with_torques: bool = True) -> tuple[dic
 
 
 def _write_parquet(trajectory: Trajectory, path: str | Path, tau: Array | None) -> None:
-    """Write Parquet, with the unit in each column's metadata and the notes in the file's metadata."""
+    """Write Parquet, with units in the columns' metadata and notes in the file's metadata."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -143,17 +144,17 @@ def _parquet_table(path: str | Path) -> "tuple[pa.Table, tuple[str, ...]]":
 
 
 def write_joint_trajectory(trajectory: Trajectory, path: str | Path, tau: Array | None = None) -> None:
-    """Write a motion as ROS's trajectory_msgs/JointTrajectory: JSON if the name ends in .json, else YAML.
+    """Write a motion as ROS's trajectory_msgs/JointTrajectory, as JSON (.json) or YAML.
 
     The joint names are `JOINTS`, as in the URDF. The extension is in m and N. A point's
-    time_from_start is measured from the first sample, in whole nanoseconds. The header's stamp is 0,
-    so the motion starts when the message arrives. Its frame is "mount", the URDF's root.
+    time_from_start is measured from the first sample, in whole nanoseconds. The header's stamp is
+    0, so the motion starts when the message arrives. Its frame is "mount", the URDF's root.
 
     The text is made here, one line per point, because a YAML library needs some 0.5 ms per point.
 
     Raises:
-        InputError: two samples fall on the same nanosecond, the motion lasts 2^31 s or longer, or the
-            file cannot be written.
+        InputError: two samples fall on the same nanosecond, the motion lasts 2^31 s or longer, or
+            the file cannot be written.
     """
     since = trajectory.t - trajectory.t[0]
     if since[-1] >= 2.0**31:

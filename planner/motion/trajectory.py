@@ -104,7 +104,8 @@ def sample(motion: Motion, step: float = STEP) -> Trajectory:
     """Sample a motion at equal steps of at most `step` seconds, both ends included.
 
     Raises:
-        InputError: step is not a positive number, or the motion needs more than MOST_SAMPLES samples.
+        InputError: step is not a positive number, or the motion needs more than MOST_SAMPLES
+            samples.
     """
     if not float(checked("step", step)) > 0.0:
         raise InputError(f"step is {step} s; it must be above 0 s")
@@ -221,7 +222,8 @@ def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, wi
         with_torques: whether to read tau. If not, tau may contain NaN.
 
     Raises:
-        InputError: a column is missing, repeated or unknown, or a value is not finite or implausible.
+        InputError: a column is missing, repeated or unknown, or a value is not finite or
+            implausible.
     """
     names = set(table.column_names)
     _complain(path, "repeats the column", {name for name, count in Counter(table.column_names).items() if count > 1})
@@ -243,7 +245,9 @@ def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, wi
 
 
 def trajectory_of(path: str | Path, data: dict[str, Array], notes: tuple[str, ...] = ()) -> Trajectory:
-    """Return the motion given by a file's quantities; a spline supplies qd and qdd if both are missing.
+    """Return the motion given by a file's quantities.
+
+    If qd and qdd are both missing, a cubic spline through q supplies them.
 
     Raises:
         InputError: only one of qd and qdd is there, there are no samples or too few for the spline,

@@ -1,4 +1,4 @@
-"""Vehicle cases: how the mount moves during a move, by slope, sinusoidal track and half-sine shock."""
+"""Vehicle cases: slope, sinusoidal track and half-sine shock move the mount during a move."""
 
 from dataclasses import dataclass
 from importlib.resources import files
@@ -35,8 +35,8 @@ _Direction = Annotated[list[Annotated[float, DIRECTION]], Field(min_length=3, ma
 class VehicleCase:
     """Load case of the vehicle, the sum of slope, track and shock, in SI units and rad.
 
-    The mount follows the ground point by point; wheelbase, tyres and the position of the mount on the
-    vehicle are neglected. The horizontal speed along the track is constant.
+    The mount follows the ground point by point; wheelbase, tyres and the position of the mount on
+    the vehicle are neglected. The horizontal speed along the track is constant.
     """
 
     name: str
@@ -99,8 +99,8 @@ LEVEL = VehicleCase("level ground", Origin(Basis.PRINTED, "the vehicle rests on 
 def base_motion(case: VehicleCase, t: ArrayLike) -> BaseMotion:
     """Return the motion of the base in a vehicle case at times t (n,) [s].
 
-    With the slope psi = atan(dz/dx) of the track, the nose rises by psi, so the pitch of the base is
-    case.pitch - psi. Heave is z(t), along `up`, and so is its acceleration.
+    With the slope psi = atan(dz/dx) of the track, the nose rises by psi, so the pitch of the base
+    is case.pitch - psi. Heave is z(t), along `up`, and so is its acceleration.
 
     Raises:
         InputError: t is not finite.
@@ -186,8 +186,8 @@ def load_case(name: str) -> VehicleCase:
     """Load a named case, or one from a TOML file of the same form (a name that ends in .toml).
 
     Raises:
-        InputError: the case is unknown, or the file cannot be read or is malformed; the message names
-            the key.
+        InputError: the case is unknown, or the file cannot be read or is malformed; the message
+            names the key.
     """
     path = named_file(_FOLDER, name, "vehicle case")
     table = read_toml(path, _CaseTable)

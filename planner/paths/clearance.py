@@ -1,7 +1,7 @@
 """Distance between the arm and the shapes that it must keep away from.
 
-Distances come from coal, the collision library of Pinocchio. It is an extra, keep-out, because it is
-large and most booms have no shapes.
+Distances come from coal, the collision library of Pinocchio. It is an extra, keep-out, because it
+is large and most booms have no shapes.
 """
 
 from dataclasses import dataclass, replace
@@ -54,8 +54,8 @@ def clearance(boom: Boom, q: Array) -> Clearance:
     `boom.keep_out` must not be None.
 
     Raises:
-        InputError: coal is not installed; the message names the extra that brings it. This holds for
-            every function here that measures distances.
+        InputError: coal is not installed; the message names the extra that brings it. This holds
+            for every function here that measures distances.
     """
     return _nearest(boom, _distances(boom, q[None])[0])
 
@@ -76,10 +76,10 @@ def least_clearance(boom: Boom, path: Path) -> Clearance:
 def nearest_approach(boom: Boom, q: Array) -> tuple[int, Clearance]:
     """Return the sample of a motion q (n, 5) at which the arm is nearest to a shape, and how near.
 
-    The distance is exact if it is below the clearance, else to 1 cm. Between two examined samples, a
-    bound on the arm's travel tells how near it could come. The samples between are examined only if
-    that is below the smallest distance so far (once this violates the clearance), or else below the
-    clearance or more than 1 cm below the smallest distance so far.
+    The distance is exact if it is below the clearance, else to 1 cm. Between two examined samples,
+    a bound on the arm's travel tells how near it could come. The samples between are examined only
+    if that is below the smallest distance so far (once this violates the clearance), or else below
+    the clearance or more than 1 cm below the smallest distance so far.
     """
     keep = boom.keep_out
     assert keep is not None
@@ -102,7 +102,7 @@ def nearest_approach(boom: Boom, q: Array) -> tuple[int, Clearance]:
 
 
 def _travel(boom: Boom, q: Array) -> Array:
-    """Return a bound (n,) on how far any point of the arm has moved since the first of q (n, 5) [m]."""
+    """Return a bound (n,) [m] on the travel of any point of the arm since the first of q (n, 5)."""
     return np.append(0.0, np.cumsum(np.abs(np.diff(q, axis=0)) @ _reach(boom)))
 
 

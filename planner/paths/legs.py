@@ -44,14 +44,15 @@ def legs(
         pitch: of the end effector at tip targets [rad]; None lets the constraint choose it.
         constraint: the extra constraint of tip targets.
         along: kind of path.
-        stops: whether the move stops at the targets on the way. If not, one smooth path goes through
-            them.
+        stops: whether the move stops at the targets on the way. If not, one smooth path goes
+            through them.
         reference: (5,) joint position that selects the branch at the start of a tip line or arc.
             None is the middle of the joint ranges.
 
     Raises:
         InputError: the kind of path does not fit the targets.
-        InfeasibleError: a target or a path is out of reach, outside the limits or too near to a shape.
+        InfeasibleError: a target or a path is out of reach, outside the limits or too near to a
+            shape.
     """
     if isinstance(along, str) and along == "joint":
         paths, notes = _joint_paths(boom, targets, pitch, constraint, stops)

@@ -1,4 +1,4 @@
-"""Paths with a parameter s from 0 to 1: a straight line in joint space, or a spline through waypoints."""
+"""Paths over s from 0 to 1: a straight line in joint space, or a spline through waypoints."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
@@ -32,8 +32,8 @@ class Path(Protocol):
 class JointLine:
     """Straight line in joint space, q(s) = start + s (goal - start).
 
-    Every position limit, the coupled one included, is linear in q, so a line between two poses within
-    the limits stays within them.
+    Every position limit, the coupled one included, is linear in q, so a line between two poses
+    within the limits stays within them.
     """
 
     start: Array
@@ -125,7 +125,7 @@ def spaced(boom: Boom, waypoints: Array) -> Array:
 
 
 def overshoot(boom: Boom, path: Path) -> str | None:
-    """Describe where a path is farthest outside the position limits; None if it stays within them."""
+    """Describe where a path is farthest outside the position limits; None if it is within them."""
     s = np.linspace(0.0, 1.0, _LOOKS)
     q = path(s)
     excess = boom.limits.excess(q).max(axis=-1)

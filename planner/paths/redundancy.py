@@ -52,7 +52,7 @@ _FIXED = 41
 _BISECTIONS = 30
 _SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
 _SIMPLE = 3
-"""Number of simple curves of a side, the fastest ones, from which the search for a fast curve starts."""
+"""Number of simple curves of a side, the fastest ones, with which the search starts."""
 
 _SAME = 1e-6
 _FLAT = 1e-9
@@ -61,7 +61,7 @@ _HATS = ((5, 0.3), (9, 0.15))
 _FIRST_TRY = 0.2  # [rad]
 _TRIES = 40
 _KEPT = 5e-4
-"""Distance [rad] of a smoothed curve from the corridor's ends, because a spline overshoots a little."""
+"""Distance [rad] of a smoothed curve from the corridor's ends, because splines overshoot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,8 @@ class Side:
     def connected(self, constraint: ChoosingConstraint | None) -> Array | None:
         """Return the connected curve theta2 (NODES,) of least cost, by dynamic programming.
 
-        Return None if no connected curve exists. Without a constraint, joint travel is the only cost.
+        Return None if no connected curve exists. Without a constraint, joint travel is the only
+        cost.
         """
         allowed, q = self.allowed, self.members
         if not allowed.any(axis=-1).all():
@@ -162,7 +163,7 @@ class Side:
 
     @property
     def furthest(self) -> int:
-        """Index of the first node that no connected curve within the limits reaches; else of the last."""
+        """Index of the first node that no curve within the limits reaches, or of the last."""
         reached = self.allowed[0]
         for i in range(1, NODES):
             near = np.convolve(reached, np.ones(2 * _STEPS + 1), mode="same") > 0.5
@@ -214,7 +215,7 @@ class Side:
         return best
 
     def fixed(self) -> Array:
-        """Return curves theta2 (k, NODES) of fixed elevation or extension, entirely within the limits."""
+        """Return curves theta2 (k, NODES) of fixed elevation or extension within the limits."""
         limits, g = self.boom.limits, self.boom.geometry
         _, F, G, _ = self.targets
         found = []
@@ -235,7 +236,7 @@ class Side:
         return kept
 
     def smoothed(self, theta2: Array, wish: Array, weight: float, lower: Array, upper: Array) -> Array:
-        """Return the curve theta2 (NODES,) in the corridor that minimises the module's objective."""
+        """Return the curve theta2 (NODES,) in the corridor of least objective (see the module)."""
         scale = 0.1  # [rad] a departure that counts as much as reaching a limit
         x = np.clip(theta2, lower, upper)
         T = float(durations(self.boom, self.curve(x)).max())
@@ -281,7 +282,7 @@ class Side:
 
 
 def _rows(boom: Boom, T: float) -> list[tuple[Array, Array]]:
-    """Return difference matrices of the first three derivatives, each with its limits at duration T."""
+    """Return difference matrices of three derivatives, each with its limits at duration T."""
     D1 = _difference()
     limits = boom.limits
     D2 = np.diff(np.eye(NODES), 2, axis=0) * (NODES - 1) ** 2
@@ -336,8 +337,8 @@ def travel_time(boom: Boom, q: Array) -> Array:
 
     The limits are joint velocity, joint acceleration and the drives' torque at standstill. With
     x = s'^2 and u = s'', each limit has the form |A u + B x + C| <= L
-    (`planner.timing.path_limits`). A backward and a forward pass over s give the largest x. The time
-    is infinite if a drive cannot hold the static load.
+    (`planner.timing.path_limits`). A backward and a forward pass over s give the largest x. The
+    time is infinite if a drive cannot hold the static load.
     """
     d1, d2, _ = _derivatives(q)
     zero = np.zeros_like(q)
@@ -354,7 +355,7 @@ def travel_time(boom: Boom, q: Array) -> Array:
     L = np.concatenate([boom.limits.acceleration, drives[driven]])
     possible = (np.abs(C) < L).all(axis=(-2, -1))
     A = np.where(np.abs(A) < _FLAT, np.where(A < 0.0, -_FLAT, _FLAT), A)
-    lower, upper = (np.where(A > 0.0, way * L - C, -way * L - C) / A for way in (-1.0, 1.0))  # bounds of u at x = 0
+    lower, upper = (np.where(A > 0.0, way * L - C, -way * L - C) / A for way in (-1.0, 1.0))  # of u at x = 0
     slope = -B / A
     step = 1.0 / (NODES - 1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -386,8 +387,8 @@ def sides_of(boom: Boom, points: Array, pitch: float, pinned: Array | None = Non
         boom: the boom.
         points: (NODES, 3) tip positions.
         pitch: [rad]
-        pinned: (5,) joint position at the first point; only the side that it is on is returned. None
-            leaves the start free.
+        pinned: (5,) joint position at the first point; only the side that it is on is returned.
+            None leaves the start free.
     """
     sides = [Side(boom, points, pitch, front, None) for front in (True, False)]
     if pinned is None:
@@ -415,7 +416,7 @@ class Departure:
 
 @dataclass(frozen=True, eq=False)
 class SelfMotion:
-    """Smooth curve through the self-motion: theta2(s) and the joint positions that follow from it."""
+    """Smooth curve through the self-motion: theta2(s) and the resulting joint positions."""
 
     side: Side
     theta2: Array
@@ -478,8 +479,8 @@ class _Seed:
 
     side: Side
     curves: list[Array]
-    """Connected curves theta2 (NODES,) within the limits: first the constraint's own, then the fastest
-    simple ones."""
+    """Connected curves theta2 (NODES,) within the limits: first the constraint's own, then the
+    fastest simple ones."""
     durations: Array
     """(3,) shortest durations of the simple curves; infinite without one."""
 
@@ -560,8 +561,8 @@ def _quickest(seeds: list[_Seed]) -> SelfMotion | None:
 def _time(side: Side, theta2: Array) -> Array:
     """Return a time (...) by which curves theta2 (..., NODES) are compared.
 
-    It is `travel_time`. Where a drive cannot hold the load, it is a much longer time that depends on
-    the joint limits.
+    It is `travel_time`. Where a drive cannot hold the load, it is a much longer time that depends
+    on the joint limits.
     """
     q = side.curve(theta2) if theta2.ndim == 1 else np.moveaxis(side.at(theta2.T), 0, 1)
     time = travel_time(side.boom, q)

@@ -1,4 +1,4 @@
-"""Targets of a move: a named pose, a joint position, or a tip position with pitch and constraint."""
+"""Targets of a move: named pose, joint position, or tip position with pitch and constraint."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,9 @@ Target = str | TipTarget | ArrayLike
 
 
 def parse_target(text: str) -> Target:
-    """Parse a target: `transport`, `q=0,90,180,0,0` (deg, m for the extension) or `tip=1.4,0,1.0` (m).
+    """Parse a target, such as `transport`, `q=0,90,180,0,0` or `tip=1.4,0,1.0`.
+
+    Joint angles are in degrees; lengths are in m.
 
     Raises:
         InputError: the numbers are malformed, not finite, or the wrong count.

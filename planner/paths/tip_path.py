@@ -34,7 +34,7 @@ _BISECTIONS = 50
 _SAME = 1e-6  # [m, rad]
 _INSET = 1e-4 * np.array([0.0, 1.0, 1.0, 1.0, 1.0])  # [rad or m]; the target determines the yaw
 _FLIP = 0.25
-"""Step between neighbouring nodes, as a share of a joint's range, above which the branch changes."""
+"""Step between nodes, as a share of a joint's range, above which the branch has changed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class TipPath:
     pitch: float
     spline: "BSpline"
     deviation: float
-    """Largest distance [m] of the tip from the curve, on a grid eight times as fine as the nodes."""
+    """Largest distance [m] of the tip from the curve, on a grid 8 times finer than the nodes."""
     departure: Departure | None = None
     """Distance of the joints from the constraint's own choice; None for a fixing constraint."""
 
@@ -79,9 +79,9 @@ def follow(
 ) -> TipPath:
     """Return the joint path along a curve of the tip, on one branch from end to end.
 
-    The branch at the start is the nearest to `reference` from which the whole curve can be followed.
-    From node to node, the nearest branch is taken. The number of nodes is doubled until the tip
-    stays within `tolerance` of the curve between them.
+    The branch at the start is the nearest to `reference` from which the whole curve can be
+    followed. From node to node, the nearest branch is taken. The number of nodes is doubled until
+    the tip stays within `tolerance` of the curve between them.
 
     Args:
         boom: the boom.

@@ -1,7 +1,7 @@
 """Timing profiles, each with its own options.
 
-To add a profile, write its law in a file of `profiles/`, write a class for it here, and add the class
-to PROFILES.
+To add a profile, write its law in a file of `profiles/`, write a class for it here, and add the
+class to PROFILES.
 """
 
 from abc import ABC, abstractmethod
@@ -67,7 +67,7 @@ class TimingProfile(ABC):
 
     @property
     def exact_on_lines(self) -> bool:
-        """Whether the law respects every limit on a straight joint path, also between its grid points."""
+        """Whether the law respects every limit between its grid points on a straight joint path."""
         return True
 
     def __str__(self) -> str:
@@ -104,14 +104,15 @@ class Cubic(TimingProfile):
     def motion(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> Motion:
         """Return the motion along a path; see `TimingProfile.motion`.
 
-        Through waypoints, the cubics have a path of their own, which must keep its clearance as well.
+        Through waypoints, the cubics have a path of their own, which must keep its clearance as
+        well.
         """
         if not isinstance(path, SplinePath):
             return super().motion(boom, path, base)
         from planner.timing.profiles.cubic_through import cubic_through
 
         motion = cubic_through(boom, path.waypoints, base)
-        require_path_clear(boom, motion.path)  # this path differs from the one that was checked before
+        require_path_clear(boom, motion.path)  # it differs from the path that was checked before
         return motion
 
 
@@ -160,7 +161,7 @@ class JerkLimited(TimingProfile):
 
     @property
     def exact_on_lines(self) -> bool:
-        """Whether the law respects every limit on a straight joint path, also between its grid points."""
+        """Whether the law respects every limit between its grid points on a straight joint path."""
         return False
 
 
@@ -201,7 +202,7 @@ class TimeOptimal(TimingProfile):
 
     @property
     def exact_on_lines(self) -> bool:
-        """Whether the law respects every limit on a straight joint path, also between its grid points."""
+        """Whether the law respects every limit between its grid points on a straight joint path."""
         return False
 
 
@@ -217,8 +218,8 @@ def parse_profile(
     """Return the profile for a word and the options given with it.
 
     Raises:
-        InputError: the profile is unknown, an option belongs to another profile, or the velocities are
-            not finite or not (k, 5).
+        InputError: the profile is unknown, an option belongs to another profile, or the velocities
+            are not finite or not (k, 5).
     """
     kind = PROFILES.get(word)
     if kind is None:

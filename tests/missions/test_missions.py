@@ -191,7 +191,7 @@ def test_life_and_tolerance_are_asked_for_in_the_file(mission):
 def test_a_step_to_where_it_stands_moves_nothing(mission):
     cycle = plan_cycle(BOOM, mission('[[steps]]\nto = "transport"\n[[steps]]\nhold_s = 1\n'))
     assert [leg.label for leg in cycle.legs] == ["hold"]
-    with pytest.raises(InputError, match="nothing moves"):
+    with pytest.raises(InputError, match="it has no move, no hold and no pause"):
         plan_cycle(BOOM, mission('[[steps]]\nto = "transport"\n'))
 
 

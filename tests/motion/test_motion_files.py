@@ -147,7 +147,7 @@ def test_times_that_ros_cannot_hold_are_refused(t: list[float], message: str, tm
 
 
 def test_another_ending_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match=r"written as \.csv, \.parquet"):
+    with pytest.raises(InputError, match=r"must end in one of \.csv, \.parquet"):
         write_motion(MOVE.trajectory, tmp_path / "move.txt")
 
 
