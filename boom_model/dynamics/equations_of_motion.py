@@ -1,6 +1,6 @@
-"""The structure of the dynamics: M(q) qdd + C(q, qd) qd + g(q) = tau, and what follows from it.
+"""Equations of motion, M(q) qdd + C(q, qd) qd + g(q) = tau, and energies.
 
-Every term is `inverse_dynamics` at a state that leaves only that term; there is no second model.
+Each term is `inverse_dynamics` at a state where the other terms vanish; there is no second model.
 """
 
 import numpy as np
@@ -17,7 +17,10 @@ _ACCELERATIONS = np.eye(5)
 
 
 def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Array:
-    """M(q) (..., 5, 5): torque per joint acceleration, payload as mass; with the drives' reflected inertia where asked.
+    """Return the mass matrix M(q) (..., 5, 5): joint torque per joint acceleration.
+
+    The payload counts as a mass. With `drive_inertia`, the reflected inertia of the drives is added
+    to the diagonal.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -30,7 +33,7 @@ def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Arr
 
 
 def velocity_torque(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
-    """C(q, qd) qd (..., 5): Coriolis and centrifugal torque.
+    """Return the Coriolis and centrifugal torque C(q, qd) qd (..., 5).
 
     Raises:
         InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
@@ -39,7 +42,9 @@ def velocity_torque(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
 
 
 def gravity_torque(boom: Boom, q: ArrayLike, *, base: BaseMotion | None = None) -> Array:
-    """g(q) (..., 5): torque that holds the joints still, against gravity and whatever `base` does besides.
+    """Return the static torque g(q) (..., 5) that keeps the joints at rest.
+
+    It balances gravity and, where `base` is given, the tilt and motion of the base.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -57,11 +62,13 @@ def forward_dynamics(
     friction: bool = False,
     drive_inertia: bool = False,
 ) -> Array:
-    """Joint accelerations (..., 5) under joint torques: qdd = M^-1 (tau - inverse_dynamics(q, qd, 0)).
+    """Return the joint accelerations (..., 5) under joint torques.
 
-    Args:
-        q, qd, tau: (..., 5); they broadcast.
-        base, friction, drive_inertia: as in `inverse_dynamics`. Coulomb friction is 0 at rest: it brakes, and does not stick.
+        qdd = M^-1 (tau - inverse_dynamics(q, qd, 0))
+
+    The arrays q, qd and tau have shape (..., 5) and broadcast. `base` and `friction` act as in
+    `inverse_dynamics`, `drive_inertia` as in `mass_matrix`. Coulomb friction is 0 at rest: it
+    brakes a moving joint, but there is no stiction.
 
     Raises:
         InputError: an input is not finite or of the wrong shape, or shapes do not match.
@@ -73,7 +80,7 @@ def forward_dynamics(
 
 
 def kinetic_energy(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
-    """(1/2) qd . M(q) qd (...) [J], on a base at rest.
+    """Return the kinetic energy (1/2) qd . M(q) qd (...) [J] on a base at rest.
 
     Raises:
         InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
@@ -85,7 +92,9 @@ def kinetic_energy(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
 
 
 def potential_energy(boom: Boom, q: ArrayLike) -> Array:
-    """sum m g z over bodies and payload (...) [J], z above frame 1 on level ground.
+    """Return the potential energy, the sum of m g z over bodies and payload (...) [J].
+
+    The height z is measured from frame 1 on level ground.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -98,5 +107,5 @@ def potential_energy(boom: Boom, q: ArrayLike) -> Array:
 
 
 def _falling(boom: Boom) -> BaseMotion:
-    """A base in free fall, where gravity is not felt."""
+    """Return a base in free fall, where gravity has no effect."""
     return BaseMotion.of(acceleration=(0.0, 0.0, -boom.gravity))
