@@ -15,7 +15,7 @@ from boom_model.boom import LOAD_UNITS
 from boom_model.drives.drive import drive_torque_limit
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import Constraint
-from planner.checks.certificate import certified
+from planner.checks.certificate import certificate_of
 from planner.checks.drives.duty import Duty
 from planner.checks.evaluation import Evaluation, at_samples, evaluate
 from planner.checks.motion_checks import check_rows
@@ -285,7 +285,7 @@ def _move(evaluation: Evaluation, trajectory: Trajectory, profile: str, duty: Du
         notes=(*grid.notes, *_vehicle_notes(vehicle)),
         assumptions=assumptions(evaluation.boom, grid.qddd is not None),
         peaks=_peaks(evaluation),
-        certificate=certified(evaluation),
+        certificate=certificate_of(evaluation),
     )
     return Move(profile, trajectory, evaluation, report)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from boom_model import JOINTS, Boom, Drive, InfeasibleError
 from planner.bisection import bisect
-from planner.checks.certificate import certified
+from planner.checks.certificate import certificate_of
 from planner.checks.evaluation import evaluate
 from planner.checks.motion_checks import check_rows
 from planner.checks.rows import Verdict, overall
@@ -70,7 +70,7 @@ def works(boom: Boom, spec: MoveSpec) -> bool:
         return False
     reactions = boom.mount.force is not None or boom.mount.moment is not None
     evaluation = evaluate(boom, planned, vehicle=spec.vehicle, reactions=reactions)
-    certificate = certified(evaluation)
+    certificate = certificate_of(evaluation)
     if certificate is not None and certificate.broken:
         return False
     return overall(check_rows(evaluation)) is not Verdict.FAIL
