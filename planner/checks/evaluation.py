@@ -53,7 +53,7 @@ class Evaluation:
 
     @cached_property
     def inertia(self) -> Array:
-        """Mass matrix (m, 5, 5) at up to INERTIA_POSES of the poses, without the drives' own inertia."""
+        """Mass matrix (m, 5, 5) at up to INERTIA_POSES poses, without the drives' own inertia."""
         count = len(self.t)
         poses = np.unique(np.linspace(0, count - 1, min(count, INERTIA_POSES)).astype(int))
         return mass_matrix(self.boom, self.trajectory.q[poses])

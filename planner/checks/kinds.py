@@ -61,7 +61,7 @@ _RPM = 60.0 / (2.0 * np.pi)
 
 
 class Quantity(Enum):
-    """Compared quantity: SI unit at a revolute joint, SI unit at a prismatic joint, displayed unit."""
+    """Compared quantity: SI units at a revolute and at a prismatic joint, displayed unit."""
 
     POSITION = ("rad", "m", Unit("deg", _DEGREE))
     VELOCITY = ("rad/s", "m/s", Unit("deg/s", _DEGREE))

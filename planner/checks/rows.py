@@ -16,7 +16,7 @@ Checks see a motion at samples only, and solvers end within a tolerance.
 """
 
 ESTIMATE_WARNING = 0.25
-"""Margin beyond the required one that an estimated or assumed limit needs for a PASS, not a WARN."""
+"""Margin beyond the required one below which an estimated or assumed limit WARNs."""
 
 
 class Verdict(StrEnum):

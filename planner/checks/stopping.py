@@ -89,7 +89,7 @@ def stop(boom: Boom, motion: Motion, at: float, base: BaseMotion | None = None) 
 
 
 def worst_stop(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = None) -> WorstStop:
-    """Return the longest and the farthest stop from the moments that divide each motion into MOMENTS."""
+    """Return the longest and the farthest stop of consecutive motions; see MOMENTS."""
     begun = 0.0
     every: list[tuple[Stop, float, float]] = []
     for motion in motions:
