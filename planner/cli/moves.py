@@ -252,12 +252,12 @@ def check(
       boom check move.csv --payload 8 --out checked.rrd
     """
     from planner.motion.motion_files import read_motion
-    from planner.planning import examine
+    from planner.planning import check_motion
 
     check_picture(picture)
     files = outputs(out, picture, document=document, inputs=(motion, boom_file, vehicle))
     boom = load_boom(boom_file, payload)
-    move = examine(boom, read_motion(motion), payload_as=payload_as, vehicle=load_vehicle(vehicle))
+    move = check_motion(boom, read_motion(motion), payload_as=payload_as, vehicle=load_vehicle(vehicle))
     written = {"recording": out, "picture": picture, "report": document}
     _write(files, move, move.report, written)
     asked = f"{motion}, {move.report.duration:.3f} s, payload {boom.payload.mass:g} kg"

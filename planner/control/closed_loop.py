@@ -1,4 +1,4 @@
-"""A planned move followed in closed loop by the full nonlinear plant; many cases side by side in one batch."""
+"""Closed-loop simulation of planned moves on the full nonlinear plant, many cases in one batch."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,37 +17,41 @@ from planner.progress import Track
 from planner.timing.time_law import Motion
 
 DIVERGED = 1.0
-"""An error [rad, the extension's in m] at which a case counts as out of control, and is simulated no further."""
+"""Position error [rad, m at the extension] above which a case counts as diverged and is stopped."""
 
-FARTHEST = 1e6
-"""Any coordinate or rate beyond this [SI] is held there, so that a case on its way out of control stays finite to its end."""
+MAX_STATE = 1e6
+"""Bound on coordinates and rates [SI]. It keeps a diverging case finite until it is stopped."""
 
 LONGEST_STEP = 1e-3
-"""Of the integrator [s], unless told otherwise: an eighth of the period of a stepper's rotor about its command."""
+"""Longest default step of the integrator [s].
+
+It is an eighth of the period of a stepper's rotor about its command.
+"""
 
 _BASE = ("velocity", "angular_velocity", "acceleration", "angular_acceleration", "up")
 
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What a controller is asked to follow: a planned move, shaped where asked."""
+    """Reference of a controller: a planned move, filtered by an input shaper."""
 
     motions: tuple[Motion, ...]
     impulses: Impulses
     at_rest: Array
-    """(5,) where an empty move stands."""
+    """(5,) joint position of an empty move."""
 
     @staticmethod
     def of(move: Move, impulses: Impulses) -> "Command":
+        """Return the command of a move with an input shaper."""
         return Command(move.motions, impulses, move.trajectory.q[-1])
 
     @property
     def duration(self) -> float:
-        """[s], the shaper's delay included."""
+        """Duration [s], including the shaper's delay."""
         return sum(motion.duration for motion in self.motions) + float(self.impulses.times[-1])
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
-        """q, qd, qdd (n, 5) at times t (n,), at rest before 0 and after the end."""
+        """Return q, qd, qdd (n, 5) at times t (n,); at rest before 0 and after the end."""
         parts = [self._unshaped(t - late) for late in self.impulses.times]
         q, qd, qdd = (np.tensordot(self.impulses.amplitudes, np.stack(part), 1) for part in zip(*parts, strict=True))
         return q, qd, qdd
@@ -69,25 +73,27 @@ class Command:
 
 @dataclass(frozen=True)
 class Gust:
-    """A push on the tip, force (1 - cos(2 pi (t - start) / duration)) / 2 along frame 1."""
+    """Gust on the tip, force (1 - cos(2 pi (t - start) / duration)) / 2 in frame 1."""
 
     force: tuple[float, float, float]
-    """Largest [N]."""
+    """Largest force [N]."""
     start: float
+    """Start [s]."""
     duration: float
+    """Duration [s]."""
 
     def __call__(self, t: Array) -> Array:
-        """(n, 3) [N] at times t (n,)."""
+        """Return the force (n, 3) [N] at times t (n,)."""
         phase = np.clip((t - self.start) / self.duration, 0.0, 1.0)
         pushes: Array = 0.5 * (1.0 - np.cos(2.0 * np.pi * phase))[:, None] * np.array(self.force)
         return pushes
 
 
 def parse_gust(text: str) -> Gust:
-    """A gust from FX,FY,FZ,START,DURATION in N and s.
+    """Return the gust that FX,FY,FZ,START,DURATION describes, in N and s.
 
     Raises:
-        InputError: not five finite numbers, or a duration that is not above 0.
+        InputError: the text is not five finite numbers, or the duration is not above 0.
     """
     try:
         values = checked("gust", [float(part) for part in text.split(",")], 5)
@@ -95,30 +101,35 @@ def parse_gust(text: str) -> Gust:
         raise InputError(f"gust {text!r} is not FX,FY,FZ,START,DURATION, five finite numbers in N and s") from None
     x, y, z, start, duration = map(float, values)
     if not duration > 0.0:
-        raise InputError(f"gust's duration is {duration:g} s; it must be above 0 s")
+        raise InputError(f"duration of the gust is {duration:g} s; it must be above 0 s")
     return Gust((x, y, z), start, duration)
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One controller on one command."""
+    """One controller that follows one command."""
 
     command: Command
     gains: tuple[Gains, ...]
-    """Designs at poses evenly spread over the command's duration; a single one holds all along."""
+    """Gains designed at evenly spaced times of the command; a single design holds throughout."""
 
     @staticmethod
     def of(plant: Plant, controller: Controller, goals: Goals, command: Command, knots: int = 17) -> "Case":
-        """A controller designed at the command's end; lqr, whose gains hold one pose's coupling, at `knots` poses of it."""
+        """Return a case whose controller is designed at the end of the command.
+
+        lqr is designed at `knots` poses along the command, because its gains contain the coupling
+        between joints at one pose.
+        """
         t = np.linspace(0.0, command.duration, knots) if controller is Controller.LQR else np.array([command.duration])
         return Case(command, tuple(design(plant, controller, goals, q) for q in command(t)[0]))
 
     @property
     def controller(self) -> Controller:
+        """Kind of controller."""
         return self.gains[0].controller
 
     def gains_at(self, t: float) -> Gains:
-        """Gains at time t [s], linear between designs."""
+        """Return the gains at time t [s], linearly interpolated between designs."""
         place = np.clip(t / max(self.command.duration, 1e-9), 0.0, 1.0) * (len(self.gains) - 1)
         i = min(int(place), max(len(self.gains) - 2, 0))
         low, high, share = self.gains[i], self.gains[min(i + 1, len(self.gains) - 1)], place - i
@@ -130,31 +141,35 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """B cases followed for the same time; n samples, one a controller's period. A case that diverged keeps its last state."""
+    """Simulation of B cases over the same time, with n samples, one per sampling period.
+
+    A case that diverged keeps its last state.
+    """
 
     t: Array
-    """(n,)"""
+    """(n,) times [s]."""
     command: Array
     """(n, B, 5) commanded joint position."""
     q: Array
-    """(n, B, 5) of the links."""
+    """(n, B, 5) joint position of the links."""
     qd: Array
+    """(n, B, 5) joint velocity of the links."""
     motor: Array
-    """(n, B, 5) of the motors at the joints' side; the joint's own where it is not elastic."""
+    """(n, B, 5) motor position at the joint side of the gears; q at a joint that is not elastic."""
     torque: Array
-    """(n, B, 5) asked of the drives [Nm], at the joints' side of the gears, before any limit."""
+    """(n, B, 5) torque command [Nm] at the joint side of the gears, before any limit."""
     limit: Array
-    """(n, B, 5) that the motors have at their speed; infinite where it is not known."""
+    """(n, B, 5) torque that the motors can give at their speed [Nm]; infinite if not known."""
     spring: Array
-    """(n, B, m) T_s"""
+    """(n, B, m) spring torque T_s [Nm]."""
     ended: Array
-    """(B,) time at which a case diverged [s]; NaN of one that did not."""
+    """(B,) time at which a case diverged [s]; NaN if it did not."""
     lost: Array
-    """(B, 5) time at which a stepper lost its first step [s]; NaN where it did not, and of other controllers."""
+    """(B, 5) time at which a stepper lost its first step [s]; NaN if it did not."""
 
 
 class _Table(NamedTuple):
-    """References on the grid of half substeps, (k, R, 5) each, R different commands."""
+    """References (k, R, 5) of R different commands, at the k times of the grid of half substeps."""
 
     q: Array
     qd: Array
@@ -162,7 +177,7 @@ class _Table(NamedTuple):
     gravity: Array
     full: Array
     """Rigid feedforward with the drives' inertia and friction."""
-    rub: Array
+    gearbox_friction: Array
 
 
 def simulate(
@@ -178,32 +193,42 @@ def simulate(
     compensate_sag: bool = False,
     track: Track = iter,
 ) -> Run:
-    """Follows every case from rest, by the classical Runge-Kutta method at `substeps` steps a sampling period.
+    """Simulate every case from rest with the classical Runge-Kutta method.
 
-    The controllers see the motors' positions, quantised; of the vehicle they know its slope. A torque beyond what the motor has
-    at its speed is cut to that, and the sum of the error stands still meanwhile. A stepper's torque is
-    T_available(speed) sin(p N (command - theta)) p = 50 for a step of 1.8 degrees, and damping about the command's speed, at
-    most T_available; the command moves in microsteps. It has lost a step where p N |command - theta| > pi.
+    The controllers read the quantised positions of the motors. They know the slope of the vehicle,
+    but not its other motion. A torque command is limited to what the motor can give at its speed.
+    While it is limited, the integral of the error is frozen.
+
+    A stepper's torque is T_available(speed) sin(p N (command - theta)), with p = 50 for a step of
+    1.8 degrees, plus damping relative to the command's speed. It is at most T_available. The
+    command moves in microsteps. The stepper has lost a step if p N |command - theta| > pi.
 
     Args:
+        plant: the plant.
+        cases: controllers with their commands.
         duration: simulated time [s].
-        model: the boom that the controllers believe in; None is the plant's own.
-        substeps: None takes as many as make a step of at most 1 ms.
-        continuous: whether torques follow exact states at every stage of the integrator, without sampling and filter.
-        compensate_sag: whether the motors are sent ahead by the twist that the model's gravity gives.
-        track: iterates over the sampling periods, and may show how far it is.
+        model: boom that the controllers assume; None is the plant's.
+        vehicle: motion of the vehicle under the boom; None is at rest on level ground.
+        gust: gust on the tip, if there is one.
+        substeps: integration steps per sampling period; None takes enough for steps of at most
+            LONGEST_STEP.
+        continuous: whether the controllers use exact states at every stage of the integrator,
+            without sampling, quantisation and filter.
+        compensate_sag: whether the motor references include the twist under the model's gravity.
+        track: iterates over the sampling periods, and may show progress.
 
     Raises:
-        InputError: no cases, or a duration that is not above 0.
+        InputError: there are no cases, the duration is not above 0, or a stepper has no elastic
+            joint.
     """
     if not cases or not duration > 0.0:
-        raise InputError(f"{len(cases)} cases for {duration:g} s: nothing to simulate")
+        raise InputError(f"nothing to simulate: {len(cases)} cases for {duration:g} s")
     boom, figures = plant.boom if model is None else model, plant.figures
     T, B, E = figures.sampling_period, len(cases), list(plant.elastic)
     stepping = np.array([case.controller is Controller.STEPPER for case in cases])
     inverse = np.array([case.controller is Controller.COMPUTED_TORQUE for case in cases])
     if stepping.any() and not E:
-        raise InputError("a stepper is simulated behind an elastic gearbox; no joint is elastic here")
+        raise InputError("a stepper needs an elastic gearbox for its simulation, and no joint is elastic")
     if substeps is None:
         substeps = max(1, int(np.ceil(T / LONGEST_STEP - 1e-9)))
     count, h = int(np.ceil(duration / T - 1e-9)) + 1, T / substeps
@@ -213,7 +238,7 @@ def simulate(
     commands = list(dict.fromkeys(case.command for case in cases))
     table = _table(plant, boom, commands, half, tilt, compensate_sag)
     row = np.array([commands.index(case.command) for case in cases])
-    grounds = _grounds(vehicle, half)
+    grounds = _base_arrays(vehicle, half)
     pushes = None if gust is None else gust(half)
     scheduled = [b for b, case in enumerate(cases) if len(case.gains) > 1]
     Kp, Kd, Ki = (np.stack([getattr(case.gains[0], name) for case in cases]) for name in ("Kp", "Kd", "Ki"))
@@ -226,22 +251,22 @@ def simulate(
     held, cap = np.zeros((B, 5)), np.full((B, 5), np.inf)
 
     def law(i: int, p: Array, v: Array, total: Array) -> Array:
-        """Torques (B, 5) from positions p, velocities v and the integral action, for the reference at half step i."""
+        """Return torques (B, 5) at half step i for positions p, velocities v, integral action."""
         q_r, qd_r, qdd_r = table.q[i][row], table.qd[i][row], table.qdd[i][row]
-        w = _times(Kp, q_r - p) + _times(Kd, qd_r - v) + total
+        w = _matvec(Kp, q_r - p) + _matvec(Kd, qd_r - v) + total
         u: Array = np.where(light, table.gravity[i][row], table.full[i][row]) + w
         if inverse.any():
             a = (qdd_r + w)[inverse]
             rigid = inverse_dynamics(boom, p[inverse], v[inverse], a, base=tilt, reactions=False, friction=True).tau
-            u[inverse] = rigid + plant.rotor * a + table.rub[i][row[inverse]]
+            u[inverse] = rigid + plant.rotor * a + table.gearbox_friction[i][row[inverse]]
         return u
 
     def torque(i: int, x: Array) -> Array:
-        """At half step i: what is held, and what a stepper pulls with."""
+        """Return the applied torques (B, 5) at half step i: held, or a stepper's own torque."""
         u = held
         if continuous:
             q, qd, theta, theta_d = _split(x, len(E))
-            p, v = _seen(q, theta, E), _seen(qd, theta_d, E)
+            p, v = _measured(q, theta, E), _measured(qd, theta_d, E)
             u = np.clip(law(i, p, v, total), -cap, cap)
         if stepping.any():
             u = u.copy()
@@ -255,7 +280,7 @@ def simulate(
         return u
 
     def rates(i: int, x: Array) -> Array:
-        x = np.clip(np.nan_to_num(x), -FARTHEST, FARTHEST)
+        x = np.clip(np.nan_to_num(x), -MAX_STATE, MAX_STATE)
         q, qd, theta, theta_d = _split(x, len(E))
         base = None if grounds is None else BaseMotion(*(ground[i] for ground in grounds))
         push = None if pushes is None else pushes[i]
@@ -263,12 +288,16 @@ def simulate(
         return np.concatenate([qd, qdd, theta_d, theta_dd], axis=1) * alive[:, None]
 
     theta_0 = table.q[0][row]
-    if stepping.any():  # turned on its command as far as the load at rest pulls it
+    if stepping.any():  # the rotor lags its command under the load at rest
         pull = gravity_torque(plant.boom, equilibrium(plant, theta_0, tilt), base=tilt)[:, E]
         lag = np.arcsin(np.clip(pull / holding, -1.0, 1.0)) / teeth
         theta_0[np.ix_(stepping, np.array(E))] -= lag[stepping]
     x = np.concatenate([equilibrium(plant, theta_0, tilt), np.zeros((B, 5)), theta_0[:, E], np.zeros((B, len(E)))], axis=1)
-    before, v, total = _quantised(_seen(x[:, :5], x[:, 10 : 10 + len(E)], E), resolution), np.zeros((B, 5)), np.zeros((B, 5))
+    before, v, total = (
+        _quantised(_measured(x[:, :5], x[:, 10 : 10 + len(E)], E), resolution),
+        np.zeros((B, 5)),
+        np.zeros((B, 5)),
+    )
 
     shape = (count, B, 5)
     q_s, qd_s, motor_s, torque_s, limit_s = (np.empty(shape) for _ in range(5))
@@ -276,7 +305,7 @@ def simulate(
     for k in track(list(range(count))):
         i = 2 * substeps * k
         q, qd, theta, theta_d = _split(x, len(E))
-        motor, motor_d = _seen(q, theta, E), _seen(qd, theta_d, E)
+        motor, motor_d = _measured(q, theta, E), _measured(qd, theta_d, E)
         off = np.abs(motor - table.q[i][row])
         fallen = alive & (~np.isfinite(x).all(axis=1) | (off > DIVERGED).any(axis=1))
         ended[fallen], alive[fallen] = k * T, False
@@ -295,7 +324,7 @@ def simulate(
         held = np.clip(asked, -cap, cap)
         if stepping.any():
             asked[stepping] = torque(i, x)[stepping]
-        total = total + np.where(np.abs(asked) > cap, 0.0, T * _times(Ki, table.q[i][row] - p))
+        total = total + np.where(np.abs(asked) > cap, 0.0, T * _matvec(Ki, table.q[i][row] - p))
         q_s[k], qd_s[k], motor_s[k], torque_s[k], limit_s[k] = q, qd, motor, asked, cap
         spring_s[k] = spring_torque(plant, q, theta - q[:, E])
         if k + 1 < count:
@@ -318,16 +347,16 @@ def _table(plant: Plant, boom: Boom, commands: Sequence[Command], t: Array, tilt
     q, qd, qdd = (np.stack(part, axis=1) for part in zip(*(command(t) for command in commands), strict=True))
     gravity = gravity_torque(boom, q, base=tilt)
     load = inverse_dynamics(boom, q, qd, qdd, base=tilt, reactions=False, friction=True).tau
-    rub = np.zeros_like(q)
+    gearbox_friction = np.zeros_like(q)
     if E:
-        rub[..., E] = friction(plant, qd[..., E], load[..., E])
+        gearbox_friction[..., E] = friction(plant, qd[..., E], load[..., E])
         if sag:
             q = q.copy()
             q[..., E] += twist_under(plant, q, gravity[..., E])
-    return _Table(q, qd, qdd, gravity, load + plant.rotor * qdd + rub, rub)
+    return _Table(q, qd, qdd, gravity, load + plant.rotor * qdd + gearbox_friction, gearbox_friction)
 
 
-def _grounds(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | None:
+def _base_arrays(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | None:
     if vehicle is None:
         return None
     base = base_motion(vehicle, t)
@@ -335,7 +364,10 @@ def _grounds(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | None:
 
 
 def _stepper_figures(plant: Plant) -> tuple[Array, Array, Array, Array]:
-    """Of each elastic joint (m,): p N [1/rad], N T_run, rotor damping at the joint, microstep at the joint."""
+    """Return p N [1/rad], N T_run, rotor damping and microstep, each (m,) for the elastic joints.
+
+    All are at the joint side of the gears.
+    """
     drives = [drive for i in plant.elastic if (drive := plant.boom.drives[i])]
     ratio = np.array([drive.gearbox.ratio for drive in drives])
     step = np.array([drive.motor.step for drive in drives])
@@ -346,7 +378,7 @@ def _stepper_figures(plant: Plant) -> tuple[Array, Array, Array, Array]:
 
 
 def _resolutions(plant: Plant) -> Array:
-    """(5,) what an encoder can tell apart at the joint, 0 where it is exact."""
+    """Return the resolution (5,) of the encoders at the joints; 0 is exact."""
     figures, joint = plant.figures, np.empty(5)
     for i, drive in enumerate(plant.boom.drives):
         counts = figures.joint_counts if drive is None else figures.encoder_counts * drive.gearbox.ratio
@@ -361,7 +393,8 @@ def _quantised(p: Array, resolution: Array) -> Array:
     return rounded
 
 
-def _seen(q: Array, theta: Array, E: list[int]) -> Array:
+def _measured(q: Array, theta: Array, E: list[int]) -> Array:
+    """Return what the encoders measure: theta at elastic joints, q elsewhere."""
     p = q.copy()
     p[:, E] = theta
     return p
@@ -371,6 +404,6 @@ def _split(x: Array, m: int) -> tuple[Array, Array, Array, Array]:
     return x[:, :5], x[:, 5:10], x[:, 10 : 10 + m], x[:, 10 + m :]
 
 
-def _times(K: Array, e: Array) -> Array:
+def _matvec(K: Array, e: Array) -> Array:
     product: Array = (K @ e[..., None])[..., 0]
     return product

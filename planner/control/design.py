@@ -1,7 +1,9 @@
-"""Controllers designed from stated goals, and what their loops are worth; the only importer of python-control.
+"""Controller design from bandwidth and damping; stability margins.
 
-Every controller reads positions p (5,) at its sampling period T, the motors' at elastic joints, and holds its torque between
-samples:
+Only this module imports python-control.
+
+Every controller reads positions p (5,) once per sampling period T, and holds its torque between
+samples. At an elastic joint p is the motor's position, elsewhere the joint's:
 
     v_k = a v_k-1 + (1 - a) (p_k - p_k-1) / T      a = exp(-2 pi f T), the velocity filter
     w = Kp (q_r - p) + Kd (qd_r - v) + sum T Ki (q_r - p)
@@ -20,14 +22,14 @@ import numpy as np
 from boom_model import InputError, gravity_torque, mass_matrix
 from boom_model.arrays import Array, read_only, scalar
 from planner.control.linear import Linear, linearise
-from planner.control.plant import Plant, slopes
+from planner.control.plant import Plant, jacobian
 
 STABLE = 1.0 + 1e-9
-"""A sampled pole of at most this size counts as stable."""
+"""Largest magnitude of a discrete-time pole that counts as stable."""
 
 
 class Controller(StrEnum):
-    """How torques follow from a reference."""
+    """Kind of controller."""
 
     PD = "pd"
     PID = "pid"
@@ -38,19 +40,24 @@ class Controller(StrEnum):
 
 @dataclass(frozen=True)
 class Goals:
-    """What a loop is designed for: poles s^2 + 2 zeta w s + w^2 and, with integral action, s + a w, of the rigid boom."""
+    """Design goals: the poles of the rigid boom in closed loop.
+
+    The polynomial is s^2 + 2 zeta w s + w^2, times s + a w with integral action.
+    """
 
     bandwidth_Hz: float = 6.0
+    """w / (2 pi) [Hz]."""
     damping: float = 1.0
+    """Damping ratio zeta."""
     integral: float = 0.3
-    """a"""
+    """a, the pole of the integral action divided by w."""
 
     @staticmethod
     def of(bandwidth_Hz: float = 6.0, damping: float = 1.0, integral: float = 0.3) -> "Goals":
-        """Goals, checked.
+        """Return checked goals.
 
         Raises:
-            InputError: not finite, or not above 0.
+            InputError: a goal is not finite or not above 0.
         """
         goals = {"bandwidth_Hz": bandwidth_Hz, "damping": damping, "integral": integral}
         for name, value in goals.items():
@@ -61,68 +68,86 @@ class Goals:
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """Gains (5, 5) of a controller: torques, and accelerations for computed torque."""
+    """Gains (5, 5) of a controller. They give torques, or accelerations for computed torque."""
 
     controller: Controller
     Kp: Array
     Kd: Array
     Ki: Array
     at: Array
-    """(5,) joint position that they were designed at."""
+    """(5,) joint position of the design."""
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Of one joint's loop, broken at its torque with the other loops closed."""
+    """Stability margins of one joint's loop, opened at its torque with the other loops closed."""
 
     joint: int
+    """Index of the joint."""
     gain_dB: float | None
-    """How much more gain it bears; None where it bears any."""
+    """Gain margin [dB]; None if it is infinite."""
     less_gain_dB: float | None
-    """How much less (negative), for a loop that gravity or an integrator makes need its gain; None where it bears any."""
+    """Gain reduction margin (negative) [dB]; None if it is infinite.
+
+    It is finite for a loop that needs its gain because of gravity or an integrator.
+    """
     phase_deg: float | None
+    """Phase margin [deg]; None if the gain never crosses 1."""
     crossover_Hz: float | None
+    """Frequency at which the phase margin is found [Hz]."""
     sensitivity_peak: float
-    """max |1 / (1 + L)|"""
+    """Largest sensitivity, max |1 / (1 + L)|."""
 
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A closed loop about one pose."""
+    """Closed loop linearised about one pose."""
 
     at: Array
-    """(5,)"""
+    """(5,) joint position."""
     poles: Array
-    """Complex, of the continuous time that gives the sampled ones: ln(z) / T [1/s]."""
+    """Complex poles s = ln(z) / T [1/s] of the discrete-time poles z."""
     largest: float
-    """Size of the largest sampled pole: below 1 is stable."""
+    """Largest magnitude of a discrete-time pole; the loop is stable below 1."""
     margins: tuple[Margins, ...]
+    """Margins of each joint; empty if they were not asked for."""
     frequencies: Array
-    """(k,) [Hz]"""
+    """(k,) frequencies [Hz]."""
     response: Array
-    """(k, 5) complex: each joint's loop L, the others closed."""
+    """(k, 5) complex response L of each joint's loop, with the others closed."""
 
     @property
     def stable(self) -> bool:
+        """Whether every discrete-time pole is at most STABLE."""
         return self.largest <= STABLE
 
 
 def design(plant: Plant, controller: Controller, goals: Goals, q: Array) -> Gains:
-    """Gains at joint position q (5,) that give a rigid boom, whose joints were alone, the poles that the goals name.
+    """Design the gains that give each joint of a rigid boom the poles of the goals at q (5,).
 
-    With J_i the inertia of joint i at q, its drive's included, and the polynomial (s^2 + 2 zeta w s + w^2)(s + a w):
+    Coupling between joints is neglected, except for lqr. J_i is the inertia of joint i at q,
+    including its drive. With the polynomial (s^2 + 2 zeta w s + w^2)(s + a w):
 
         pd    Kp = J w^2, Kd = 2 zeta w J
         pid   Kp = (1 + 2 zeta a) w^2 J, Kd = (2 zeta + a) w J, Ki = a w^3 J
-        lqr   least integral of e' Q e + u' R u with R = (M M')^-1, which weighs torques as the accelerations that they give,
-              and, for (integral of e, e, de/dt), Q = (a^2 w^6, (1 + a^2 (4 zeta^2 - 2)) w^4, (a^2 + 4 zeta^2 - 2) w^2):
-              without gravity these give exactly the pid's poles, joints coupled; M has the drives' inertia in it
+        lqr   minimum of the integral of x' Q x + u' R u, with x = (integral of e, e, de/dt)
+              R = (M M')^-1
+              Q = (a^2 w^6, (1 + a^2 (4 zeta^2 - 2)) w^4, (a^2 + 4 zeta^2 - 2) w^2)
         computed-torque   kp = w^2, kd = 2 zeta w, as accelerations
 
-    A stepper has no gains; the joints without a drive follow it by pd about the full feedforward.
+    R weighs torques by the accelerations that they cause. M includes the drives' inertia. Without
+    gravity lqr gives exactly the poles of pid, with the joints coupled.
+
+    A stepper has no gains. Beside a stepper, joints without a drive use pd with full feedforward.
+
+    Args:
+        plant: the plant.
+        controller: kind of controller.
+        goals: design goals.
+        q: joint position (5,).
 
     Raises:
-        InputError: the goals give lqr a negative weight.
+        InputError: the damping is too small for lqr, whose weights would be negative.
     """
     w, zeta, a = 2.0 * np.pi * goals.bandwidth_Hz, goals.damping, goals.integral
     M = mass_matrix(plant.boom, q) + np.diag(plant.rotor)
@@ -145,36 +170,43 @@ def _lqr(plant: Plant, goals: Goals, q: Array, M: Array) -> tuple[Array, Array, 
     w, zeta, a = 2.0 * np.pi * goals.bandwidth_Hz, goals.damping, goals.integral
     weights = (1.0 + a**2 * (4.0 * zeta**2 - 2.0)) * w**4, (a**2 + 4.0 * zeta**2 - 2.0) * w**2, a**2 * w**6
     if min(weights) < 0.0:
-        raise InputError(f"damping is {zeta:g}; lqr needs at least {np.sqrt(max(0.5 - a**2 / 4.0, 0.0)):.3g} for its weights")
+        raise InputError(
+            f"damping is {zeta:g}; lqr needs at least {np.sqrt(max(0.5 - a**2 / 4.0, 0.0)):.3g} for non-negative weights"
+        )
     rigid = linearise(Plant.of(plant.boom, plant.figures, elastic=False), q)
-    system = control.ss(rigid.A, rigid.B @ M, np.eye(10), 0.0)  # from accelerations M^-1 u: their weight is 1
+    system = control.ss(rigid.A, rigid.B @ M, np.eye(10), 0.0)  # input is the acceleration M^-1 u, with weight 1
     k, _, _ = control.lqr(system, np.diag(np.repeat(weights, 5)), np.eye(5), integral_action=rigid.measured)
     K = M @ k
     return K[:, :5], K[:, 5:10], K[:, 10:]
 
 
 def feedback_of(plant: Plant, gains: Gains, q: Array) -> tuple[Array, Array, Array]:
-    """-du/dp, -du/dv and -du/d(sum) (5, 5) of a controller about a pose q (5,)."""
+    """Return -du/dp, -du/dv and -du/d(sum) (5, 5) of a controller about a pose q (5,)."""
     if gains.controller is not Controller.COMPUTED_TORQUE:
         return gains.Kp, gains.Kd, gains.Ki
     M = mass_matrix(plant.boom, q) + np.diag(plant.rotor)
-    return M @ gains.Kp - slopes(lambda x: gravity_torque(plant.boom, x), q), M @ gains.Kd, M @ gains.Ki
+    return M @ gains.Kp - jacobian(lambda x: gravity_torque(plant.boom, x), q), M @ gains.Kd, M @ gains.Ki
 
 
 def analyse(plant: Plant, gains: Gains, q: Array, *, model: Plant | None = None, responses: bool = True) -> Loop:
-    """Poles, margins and sensitivity of the sampled loop about a pose q (5,): plant with hold, velocity filter and all.
+    """Compute poles, margins and sensitivity of the discrete-time loop about a pose.
+
+    The loop includes the zero-order hold and the velocity filter.
 
     Args:
-        model: the plant as the controller believes it to be; None is the plant itself.
-        responses: whether to compute margins and responses too; poles come always.
+        plant: the plant.
+        gains: gains of the controller.
+        q: joint position (5,).
+        model: plant that the controller assumes; None is `plant`.
+        responses: whether to compute margins and frequency responses too.
 
     Raises:
-        InputError: a stepper, which has no loop.
+        InputError: the controller is a stepper, which has no loop.
     """
     import control
 
     if gains.controller is Controller.STEPPER:
-        raise InputError("a stepper runs open loop: it has no poles to place and no margins")
+        raise InputError("a stepper runs in open loop: it has no closed-loop poles and no margins")
     T = plant.figures.sampling_period
     linear = linearise(plant, q)
     sampled = _sampled(linear, T)
@@ -189,7 +221,7 @@ def analyse(plant: Plant, gains: Gains, q: Array, *, model: Plant | None = None,
     f = np.geomspace(0.02, 0.4999 / T, 2000)
     P, C = (np.moveaxis(_response(s, f), -1, 0) for s in (sampled, law))
     L = C @ P
-    each = np.stack([_alone(L, i) for i in range(5)], axis=-1)
+    each = np.stack([_joint_loop(L, i) for i in range(5)], axis=-1)
     margins = tuple(_margins(i, f, each[:, i]) for i in range(5))
     return Loop(q, continuous[order], largest, margins, f, each)
 
@@ -201,7 +233,7 @@ def _sampled(linear: Linear, T: float) -> Any:
 
 
 def _law(plant: Plant, gains: Gains, q: Array, T: float) -> Any:
-    """The controller as a system from p to -u, its states (p_k-1, v_k-1, sum)."""
+    """Return the controller as a system from p to -u with states (p_k-1, v_k-1, sum)."""
     import control
 
     Kp, Kd, Ki = feedback_of(plant, gains, q)
@@ -219,8 +251,8 @@ def _response(system: Any, f: Array) -> Any:
     return system(np.exp(2j * np.pi * f * system.dt), squeeze=False)
 
 
-def _alone(L: Any, i: int) -> Any:
-    """Loop i with the others closed: L_ii - L_io (1 + L_oo)^-1 L_oi, (k,)."""
+def _joint_loop(L: Any, i: int) -> Any:
+    """Return loop i with the others closed (k,): L_ii - L_io (1 + L_oo)^-1 L_oi."""
     o = [j for j in range(5) if j != i]
     rest = np.linalg.solve(np.eye(4) + L[:, o][:, :, o], L[:, o, i][..., None])[..., 0]
     return L[:, i, i] - np.einsum("kj,kj->k", L[:, i, o], rest)
