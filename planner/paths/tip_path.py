@@ -30,6 +30,10 @@ TIP_TOLERANCE = 1e-5
 """Largest allowed distance [m] of a spline from its curve, a tenth of the tolerance of a sweep."""
 
 _NODES = (64, 128, 256, 512, 1024, 2048)
+_FEWEST = 6
+"""Number of steps of the shortest curves. Nodes closer than the tolerance add nothing to a spline
+but rounding, which a third derivative enlarges with the cube of their number."""
+
 _CHECKS_PER_NODE = 8
 _BISECTIONS = 50
 _SAME = 1e-6  # [m, rad]
@@ -120,7 +124,8 @@ def _fitted(
     """
     from scipy.interpolate import make_interp_spline
 
-    for count in _NODES:
+    fewest = int(np.clip(curve.length / tolerance, _FEWEST, _NODES[0]))
+    for count in (fewest, *_NODES[fewest == _NODES[0] :]):
         s = np.linspace(0.0, 1.0, count + 1)
         spline = make_interp_spline(s, nodes(s), k=5)
         fine = np.linspace(0.0, 1.0, count * _CHECKS_PER_NODE + 1)
