@@ -51,7 +51,7 @@ def test_plan_takes_payload_duration_and_boom(boom, tmp_path):
 
 def test_the_profiles_to_choose_from_are_the_planners():
     (option,) = [each for each in cli.cli.commands["plan"].params if each.name == "profile"]
-    assert list(option.type.choices) == [profile.value for profile in Profile]
+    assert list(option.type.words) == [profile.value for profile in Profile]
 
 
 VIA = ("--via", "q=40,30,90,0.3,-10")
@@ -143,7 +143,7 @@ def test_profiles_stand_side_by_side(boom):
     assert code == 0
     for name, row in rows.items():
         assert any(name.split(",")[0] in line and f"{row['duration_s']:.3f} s" in line for line in out.splitlines())
-    assert out.count("jumps") == 3
+    assert all("INCOMPLETE" in line for line in out.splitlines() if " s " in line)
 
 
 def test_vehicle_is_taken_by_plan_and_check(boom):
@@ -219,7 +219,7 @@ def test_check_of_a_motion_outside_the_limits_reports_and_fails(boom):
     boom("plan", "transport", "phenotyping", "--csv", "move.csv")
     code, out, _ = boom("check", "move.csv", "--payload", "60")
     assert code == 1
-    assert "FAIL: fails: inner gearbox" in out
+    assert "FAIL: inner gearbox" in out
     code, out, _ = boom("check", "move.csv", "--json")
     assert code == 0
     assert json.loads(out)["profile"] == "recorded"
@@ -240,7 +240,7 @@ def test_validate_holds(boom):
     [
         (("plan", "transport", "parking"), 2, "unknown pose 'parking'"),
         (("plan", "transport"), 2, "Missing argument 'GOAL'"),
-        (("plan", "transport", "phenotyping", "--profile", "fast"), 2, "'fast' is not one of"),
+        (("plan", "transport", "phenotyping", "--profile", "fast"), 2, "unknown profile 'fast'; there are: cubic"),
         (("plan", "transport", "phenotyping", "--duration", "nan"), 2, "duration is nan"),
         (("plan", "transport", "phenotyping", "--duration", "1"), 1, "needs at least 5 s"),
         (("plan", "transport", "phenotyping", "--payload", "-1"), 2, "payload is -1"),
@@ -253,15 +253,19 @@ def test_validate_holds(boom):
         (("plan", "transport", "q=0,130,180,0,0"), 1, "inner 130 deg is 10 deg above"),
         (("plan", "transport", "tip=2,0,3", "--constraint", "extension=0"), 1, "out of reach"),
         (("plan", "transport", "tip=0,2.5,0.8", "--pitch", "up"), 1, "wrist 180 deg is 90 deg above its limit"),
-        (("plan", "transport", "tip=1,0,1", "--constraint", "sideways"), 2, "constraint 'sideways' is not known"),
+        (
+            ("plan", "transport", "tip=1,0,1", "--constraint", "sideways"),
+            2,
+            "unknown constraint 'sideways'; there are: horizontal",
+        ),
         (("ik", "1", "nan", "1"), 2, "position[1] is nan"),
         (("ik", "1", "x", "1"), 2, "'x' is not a valid float"),
         (("ik", "1", "0", "1", "--hodl", "horizontal"), 2, "--hodl"),
         (("torque", "none.csv", "--out", "x.csv"), 2, "none.csv: cannot be read"),
         (("check", "bad.toml"), 2, "bad.toml: lacks the column"),
         (("view", "none.rrd"), 2, "none.rrd"),
-        (("plan", "transport", "phenotyping", "--csv", "move.rrd"), 2, "it is to hold two things"),
-        (("plan", "transport", "phenotyping", "--out", "."), 2, "cannot be written"),
+        (("plan", "transport", "phenotyping", "--csv", "move.rrd"), 2, "move.rrd: the name must end in .csv"),
+        (("plan", "transport", "phenotyping", "--out", "."), 2, "the name must end in .rrd"),
         (("plan", "transport", "phenotyping", "--duration", "2e5"), 2, "needs more than 10,000,000 samples"),
         (("plan", "transport", "phenotyping", "--along", "line"), 2, "is not a tip target"),
         (("check", "twice.csv"), 2, "repeats the column q1"),

@@ -190,8 +190,11 @@ def test_the_command_fails_where_the_boom_does(boom, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--controller", "pdd"), "controller is 'pdd'; there are: pd, pid, computed-torque, lqr, stepper, or all"),
-        (("--profile", "cubic,slow"), "profile is 'slow'"),
+        (
+            ("--controller", "pdd"),
+            "unknown controller 'pdd'; did you mean pd? There are: pd, pid, computed-torque, lqr, stepper, or all",
+        ),
+        (("--profile", "cubic,slow"), "unknown profile 'slow'"),
         (("--set", "rate=5"), "unknown figure 'rate'"),
         (("--bandwidth", "-1"), "bandwidth is -1 Hz; it must be between 0.001 and 100000 Hz"),
         (("--gust", "1,2"), "is not FX,FY,FZ,START,DURATION"),

@@ -279,8 +279,13 @@ def test_compare_prints_a_table_or_json_and_records(boom):
     code, out, err = boom("compare", "move.csv", "log.csv", "--offset", "best", "--out", "both.rrd")
     assert (code, err) == (0, "")
     assert Path("both.rrd").exists()
+    assert "tip error at most" in out
+    code, out, _ = boom("compare", "move.csv", "log.csv", "--offset", "best", "--all")
     assert "Savitzky-Golay filter over 21 samples" in out
-    assert "tip error: at most" in out
+    for tolerance, verdict, expected in (("0.01", "PASS", 0), ("0.0001", "FAIL", 1)):
+        code, out, err = boom("compare", "move.csv", "log.csv", "--offset", "best", "--tolerance", tolerance)
+        assert (code, f"{verdict}: tip error" in out) == (expected, True)
+        assert bool(err) == (expected == 1)
     code, out, _ = boom("compare", "move.csv", "log.csv", "--offset", "-30", "--json")
     answer = json.loads(out)
     assert (code, answer["offset_s"], answer["files"]) == (0, -30.0, {})

@@ -224,7 +224,7 @@ def test_a_bad_mission_names_file_and_key(mission, steps, said):
             InfeasibleError,
             "mission mine, steps 2: duration",
         ),
-        ('[[steps]]\nto = "phenotyping"\nprofile = "fast"\n', InputError, "steps 1: profile is 'fast'"),
+        ('[[steps]]\nto = "phenotyping"\nprofile = "fast"\n', InputError, "steps 1: unknown profile 'fast'"),
         ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2"]\n', InputError, "steps 1: "),
         ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2,3,0,0"]\n', InputError, "via velocity: 1 given for 0 via"),
         ('[[steps]]\nrepeat = 1\n[[steps.steps]]\nto = "tip=9,0,0"\n', InfeasibleError, "steps 1, steps 1: tip"),

@@ -132,5 +132,5 @@ def test_a_line_starts_where_the_move_before_it_ended():
 
 
 def test_least_time_of_a_single_target_is_refused():
-    with pytest.raises(InputError, match="least-time chooses along a line or an arc of the tip"):
+    with pytest.raises(InputError, match="constraint least-time needs a line or an arc of the tip"):
         plan(BOOM, "transport", "tip=1.4,0,1.0", constraint="least-time")
