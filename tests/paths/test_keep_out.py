@@ -1,29 +1,22 @@
 """Shapes to keep away from: distances by convex search in place of a collision library, detours, refusals, the file's table."""
 
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from boom_model import Basis, Boom, InfeasibleError, InputError, Origin
+from boom_model import Basis, Boom, InfeasibleError, InputError
 from boom_model.boom_file import BOOM_FILE
-from boom_model.keep_out import Box, Capsule, KeepOut
+from boom_model.keep_out import Box, Capsule
 from planner import Cubic, TipTarget, plan
 from planner.paths.clearance import LINKS, clearance, least_clearance
 from planner.paths.path import JointLine, through
 from planner.paths.routing import detour
+from tests.builders import ORIGIN, POST, ROUND_POST, with_shapes
 
 BOOM = Boom.load()
 LIMITS = BOOM.limits
-ORIGIN = Origin(Basis.ASSUMED, "a test")
-POST = Capsule("post", np.array([1.0, 1.0, -1.0]), np.array([1.0, 1.0, 0.6]), 0.1, ORIGIN)
 GROUND = Box("ground", np.array([0.0, 0.0, -1.5]), np.array([20.0, 20.0, 1.0]), ORIGIN)
-ROUND_POST = np.array([np.radians(10), 0.5, 2.6, 0.3, 0.0]), np.array([np.radians(80), 0.5, 2.6, 0.3, 0.0])
-
-
-def with_shapes(*shapes, gap=0.05, link=0.06, payload=0.15):
-    return replace(BOOM, keep_out=KeepOut(shapes, gap, link, payload, ORIGIN))
 
 
 def lines(q):
@@ -86,7 +79,7 @@ def test_distances_are_those_of_a_convex_search():
     rng = np.random.default_rng(8)
     apart = 0
     for _ in range(200):
-        boom = with_shapes(random_shape(rng, "one"), random_shape(rng, "two"), link=rng.uniform(0.01, 0.1))
+        boom = with_shapes(random_shape(rng, "one"), random_shape(rng, "two"), link_radius=rng.uniform(0.01, 0.1))
         q = rng.uniform(LIMITS.lower, LIMITS.upper)
         expected, found = distances(boom, q), clearance(boom, q)
         if expected.min() > 0.0:
@@ -109,7 +102,7 @@ def test_nothing_thin_is_missed_on_the_way():
         place = lines(start + rng.uniform(0.1, 0.9) * (goal - start))[5, 1] + rng.normal(0.0, 0.15, 3)
         half = np.array([0.0, 0.0, 0.5])
         wire = Capsule("wire", place - half, place + half, 0.01, ORIGIN)
-        boom = with_shapes(wire, gap=0.02, link=0.02, payload=0.04)
+        boom = with_shapes(wire, clearance=0.02, link_radius=0.02, payload_radius=0.04)
         path = JointLine(start, goal)
         truly = distances(boom, path(np.linspace(0.0, 1.0, 3001))).min()
         found = least_clearance(boom, path)
@@ -193,7 +186,7 @@ def test_cubics_through_waypoints_are_held_clear_on_their_own_path_and_not_on_th
     (motion,) = plan(BOOM, start, goal, via=[via], profile=Cubic.with_velocities(velocities)).motions
     travelled = motion(np.linspace(0.0, motion.duration, 401))[0]
     looked_at = through(BOOM, np.array([start, via, goal]))(np.linspace(0.0, 1.0, 601))
-    options = {"gap": 0.01, "link": 0.01, "payload": 0.01}
+    options = {"clearance": 0.01, "link_radius": 0.01, "payload_radius": 0.01}
     best = None
     for place in lines(travelled)[::20, 5, 1]:
         boom = with_shapes(Capsule("ball", place, place, 0.01, ORIGIN), **options)
