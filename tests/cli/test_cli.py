@@ -14,6 +14,7 @@ from boom_model.boom_file import BOOM_FILE
 from planner import Cubic, TimeOptimal, cli, plan
 from planner.motion.trajectory import read_csv
 from planner.timing.profile import Profile
+from tests.builders import STRONG_CATALOGUE, UNDERSIZED_MISSION, main_move
 
 
 def test_plan_does_the_main_job(boom, tmp_path):
@@ -24,8 +25,7 @@ def test_plan_does_the_main_job(boom, tmp_path):
     assert len(out.splitlines()) <= 20
     assert max(map(len, out.splitlines())) <= 80
     assert "assumed: lower bus voltage 80 V" in boom("plan", "transport", "phenotyping", "--all")[1]
-    expected = plan(Boom.load(), "transport", "phenotyping")
-    np.testing.assert_array_equal(read_csv("move.csv").q, expected.trajectory.q)
+    np.testing.assert_array_equal(read_csv("move.csv").q, main_move().trajectory.q)
 
 
 @pytest.mark.parametrize("profile", [profile.value for profile in Profile])
@@ -126,7 +126,7 @@ def test_profiles_stand_side_by_side(boom):
     assert list(rows) == [*Profile, "time-optimal, jerk bound"]
     for name, row in rows.items():
         profile = TimeOptimal(jerk_bound=True) if "bound" in name else name
-        report = plan(Boom.load(), "transport", "phenotyping", profile=profile).full_report
+        report = main_move(profile).full_report
         worst = {each.limit: each.ratio for each in report.certificate.worst}
         assert row["duration_s"] == pytest.approx(report.duration, rel=1e-12)
         assert (row["stop_s"], row["stop_m"]) == (report.stop.time_s, report.stop.distance_m)
@@ -391,10 +391,8 @@ def test_size_stands_on_a_slope(boom):
 
 
 def test_size_replans_a_mission_that_the_fitted_drive_cannot_do(boom, tmp_path):
-    from tests.sizing.test_sizing import STRONG, UNDERSIZED
-
-    (tmp_path / "quick.toml").write_text(UNDERSIZED)
-    (tmp_path / "strong.toml").write_text(STRONG)
+    (tmp_path / "quick.toml").write_text(UNDERSIZED_MISSION)
+    (tmp_path / "strong.toml").write_text(STRONG_CATALOGUE)
     asked = ("size", "quick.toml", "--joint", "lower", "--payload", "30", "--catalogue", "strong.toml")
     for adapt in ("nothing", "rescale"):
         code, out, err = boom(*asked, "--adapt", adapt)

@@ -19,6 +19,7 @@ from boom_model.boom_file import BOOM_FILE
 from planner import cli, plan
 from planner.cli.failures import failure
 from planner.motion.trajectory import COLUMNS, write_csv
+from tests.builders import hidden
 
 COMMAND = [sys.executable, "-c", "from planner.__main__ import main; main()"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
@@ -350,10 +351,6 @@ def test_a_picture_in_a_source_is_not_loaded(boom, motion, tmp_path):
 
 
 # Signals
-
-
-def hidden(folder):
-    return [name for name in os.listdir(folder) if name.startswith(".")]
 
 
 OUTPUTS = ("--csv", "m.csv", "--report", "r.md")
