@@ -60,8 +60,7 @@ def main() -> int:
     check, wrong = "--check" in sys.argv[1:], []
     with tempfile.TemporaryDirectory() as folder:
         for name, (title, commands) in PAGES.items():
-            parts = [f"# {title}
-", INTRODUCTION]
+            parts = [f"# {title}\n", INTRODUCTION]
             for command in commands:
                 answer = run(command, folder)
                 if len(answer.splitlines()) > LONGEST:

@@ -29,14 +29,14 @@ def main() -> None:
 
 
 _QUESTIONS = """\
-Can the boom make this move, and what would it ask of its drives?
+Can the boom make a move, and do its drives stand it?
   boom plan transport phenotyping
 Which motors and gearboxes do for a day in the field?
   boom size field-day
 How light may a link be?
   boom link
 
-`boom info` shows the boom, `boom --help` lists the commands."""
+`boom info` shows the boom, `boom --help` every command."""
 
 
 class _Commands(click.Group):
