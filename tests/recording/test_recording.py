@@ -234,19 +234,19 @@ def test_series_say_what_they_are_in_which_unit_and_what_is_assumed(recorded: Re
             mark = " (assumed)" if BOOM.limits.origins[name][i].basis is Basis.ASSUMED else ""
             assert recorded.static(f"/plots/{quantity}/{joint}", "SeriesLines:names") == [f"{joint} {name} {unit}"]
             limits = recorded.static(f"/plots/{quantity}/{joint}/limits", "SeriesLines:names")
-            assert limits == [f"lower limit {unit}{mark}", f"upper limit {unit}{mark}"]
+            assert limits == [f"minimum {unit}{mark}", f"maximum {unit}{mark}"]
     assert recorded.static("/plots/q/linkage", "SeriesLines:names") == ["lower - inner [deg]"]
-    assert recorded.static("/plots/q/linkage/limits", "SeriesLines:names") == ["lower limit [deg]"]
+    assert recorded.static("/plots/q/linkage/limits", "SeriesLines:names") == ["minimum [deg]"]
     assert recorded.static("/plots/tau/extension", "SeriesLines:names") == ["extension force [N]"]
     assert recorded.static("/plots/tau/wrist", "SeriesLines:names") == ["wrist torque [Nm]"]
     assert recorded.static("/plots/tau/inner/limits", "SeriesLines:names") == [
-        "lower drive limit [Nm] (assumed)",  # by the assumed supply
-        "upper drive limit [Nm] (assumed)",
+        "drive minimum [Nm] (assumed)",  # by the assumed supply
+        "drive maximum [Nm] (assumed)",
     ]
 
 
 def test_assumed_position_limits_are_marked(standing: Recorded):
-    expected = ["lower limit [deg] (assumed)", "upper limit [deg] (assumed)"]
+    expected = ["minimum [deg] (assumed)", "maximum [deg] (assumed)"]
     assert standing.static("/plots/q/yaw/limits", "SeriesPoints:names") == expected
     assert standing.static("/plots/q/linkage/limits", "SeriesPoints:names") == expected[:1]
 
