@@ -28,6 +28,7 @@ from planner.motion.vehicle import base_pose, load_case
 from planner.planning import Move, plan
 from planner.recording import write_recording
 from tests.builders import without_drives
+from tests.recordings import recorded_entities, recorded_rows
 
 BOOM = Boom.load()
 FLOAT32 = 5e-7  # of positions up to 3 m and of rotations, once rounded to float32
@@ -48,11 +49,7 @@ class Recorded:
 
     def rows(self, entity: str, component: str, static: bool = False) -> list[Any]:
         """A component's rows, in order of time."""
-        stream = RrdReader(self.path).stream().filter(content=entity, is_static=static, components=component)
-        batches = [chunk.to_record_batch() for chunk in stream.to_chunks()]
-        times = [0] * len(batches) if static else [batch.column("t")[0].value for batch in batches]
-        ordered = [batch for _, batch in sorted(zip(times, batches, strict=True), key=lambda pair: pair[0])]
-        return [row for batch in ordered for row in batch.column(component).to_pylist()]
+        return recorded_rows(self.path, entity, component, static)
 
     def static(self, entity: str, component: str) -> Any:
         (row,) = self.rows(entity, component, static=True)
@@ -68,7 +65,7 @@ class Recorded:
         return np.array(self.rows(entity, "Scalars:scalars"))
 
     def entities(self) -> set[str]:
-        return set(RrdReader(self.path).store().schema().entity_paths())
+        return recorded_entities(self.path)
 
     def poses(self, entity: str) -> Array:
         T = np.zeros((len(self.move.trajectory.t), 4, 4))
