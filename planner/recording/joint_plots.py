@@ -88,8 +88,9 @@ def torque_plots(boom: Boom, trajectory: Trajectory, tau: Array) -> Iterator[Plo
             limits = {"drive minimum": -limit - own, "drive maximum": limit - own}
         basis = Basis.weakest([Basis.ESTIMATED, *([] if drive is None else [o.basis for o in drive.supply_origins])])
         name = "force" if IS_LENGTH[i] else "torque"
-        shown = f"{joint} {name}" if limits else f"{joint} {name}, no drive to limit it"
-        yield Plot(f"plots/tau/{joint}", shown, LOAD_UNITS[i], JOINT_COLORS[joint], tau[:, i], limits, basis)
+        why = "" if limits else "no drive limits it"
+        unit, color = LOAD_UNITS[i], JOINT_COLORS[joint]
+        yield Plot(f"plots/tau/{joint}", f"{joint} {name}", unit, color, tau[:, i], limits, basis, why)
 
 
 def ratio_bundles(ratios: dict[str, Array]) -> list[Bundle]:

@@ -23,6 +23,8 @@ from planner.recording.torque_ratio import legend, log_tip_path, torque_ratios, 
 from planner.recording.torque_speed import log_plane, planes
 from planner.reports.drive_pictures import drive_picture
 
+_TEXTS = ("assumptions", "checks", "report")
+
 
 def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = None) -> None:
     """Write the recording of a move with its blueprint; `boom view` or `rerun` shows it.

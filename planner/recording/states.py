@@ -47,7 +47,7 @@ def lanes(move: Move) -> tuple[Lane, ...]:
 
 
 def phases(move: Move) -> list[str]:
-    """Return the phase at each sample, from the rate at which the fastest joint's speed changes.
+    """Return the phase at each sample, from the change of speed up to the next sample.
 
     Speed is the largest of the joints' speeds, each as a share of its limit.
     """
@@ -55,7 +55,8 @@ def phases(move: Move) -> list[str]:
     speed = (np.abs(move.trajectory.qd) / limits.velocity).max(axis=-1)
     if len(t) < 2:
         return [_REST] * len(t)
-    change = np.gradient(speed, t)
+    steps = np.diff(t)
+    change = np.append(np.where(steps > 0.0, np.diff(speed) / np.where(steps > 0.0, steps, 1.0), 0.0), 0.0)
     scale = np.abs(change).max() * _STEADY
     named = np.where(change > scale, "accelerating", np.where(change < -scale, "braking", "steady"))
     return [str(phase) for phase in np.where(_at_rest(move), _REST, named)]
