@@ -1,4 +1,7 @@
-"""The command `boom`: parsing and printing, nothing else. What is slow to import is imported by the command that needs it."""
+"""The command `boom`: parses arguments and prints results.
+
+Each command imports the modules that are slow to import itself.
+"""
 
 import errno
 import os
@@ -13,13 +16,17 @@ from planner.cli.printing import quieten
 
 
 def main() -> None:
-    """Run the command; exit 0 done, 1 the answer is no, 2 bad input, 70 an internal error, each but 0 with one line."""
+    """Run the command and exit.
+
+    The exit code is 0 if all is well, 1 if the answer is no, 2 for bad input, 130 if interrupted,
+    and 70 for an internal error. Every code but 0 comes with one line on standard error.
+    """
     try:
         if sys.stdout is None:
             raise InputError("standard output is closed")
         code = cli.main(prog_name="boom", standalone_mode=False)
         sys.stdout.flush()
-    except SystemExit as stop:  # click ends by itself after shell completion, and, with 1, where a pipe has lost its reader
+    except SystemExit as stop:  # by click: after shell completion, and with 1 if the reader of a pipe has gone
         code = failure(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))) if stop.code else 0
     except (Exception, KeyboardInterrupt) as error:
         code = failure(error)
@@ -29,7 +36,7 @@ def main() -> None:
 @click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
 @click.version_option(package_name="boom", prog_name="boom")
 def cli() -> None:
-    """Plan, check and watch the moves of the third-generation phenotyping boom.
+    """Plan, check and record moves of the third-generation phenotyping boom.
 
     Angles are in degrees and lengths in metres; files and JSON are in SI.
     """
@@ -53,6 +60,6 @@ for _command in (
     files.view,
 ):
     _command.params.append(
-        click.Option(["-q", "--quiet"], is_flag=True, expose_value=False, callback=quieten, help="Print errors alone.")
+        click.Option(["-q", "--quiet"], is_flag=True, expose_value=False, callback=quieten, help="Print errors only.")
     )
     cli.add_command(_command)

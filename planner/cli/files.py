@@ -1,4 +1,4 @@
-"""Exports and imports, the validation against the thesis, and the viewer."""
+"""The commands that convert, compare and view files, and validate the model."""
 
 import subprocess
 import sys
@@ -16,14 +16,14 @@ from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json
 @click.argument("motion", metavar="IN")
 @click.argument("out", metavar="OUT")
 def export(motion: str, out: str) -> int:
-    """Turn a motion into another tool's form, by the ending of OUT.
+    """Convert a motion to the format given by the ending of OUT.
 
     \b
-    .csv          t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, and tau1..tau5 where IN has them
+    .csv          t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, and tau1..tau5 if IN has them
     .parquet      the same columns, with their units
     .yaml, .json  ROS trajectory_msgs/JointTrajectory
 
-    IN is a CSV or Parquet file; its torques go along as they are.
+    IN is a CSV or Parquet file. Its torques are copied unchanged.
 
     \b
     Examples:
@@ -52,9 +52,9 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     """Write the boom, with its payload, as URDF or as MJCF for MuJoCo (.xml).
 
     \b
-    URDF  a tree: mimic joints keep the parallelogram. A torque that a tool computes for a
-          mimic joint belongs to the joint that it mimics.
-    MJCF  the loop closed by a constraint, a motor on each joint, the named poses as keyframes.
+    URDF  a tree; mimic joints keep the parallelogram. A torque that a tool computes for a
+          mimic joint acts on the joint that it mimics.
+    MJCF  a constraint closes the loop; a motor on each joint; the named poses are keyframes.
 
     \b
     Example:
@@ -74,16 +74,16 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
 @click.argument("measured", metavar="MEASURED")
 @click.option(
     "--offset", default="0", show_default=True, metavar="S|best",
-    help="Added to the log's times; best fits them to the plan, and so hides a delay of the drives.",
+    help="Time added to the log. best fits it to the plan, which hides a delay of the drives.",
 )  # fmt: skip
 @click.option(
     "--window",
     type=float,
     callback=plausible(WINDOW),
     metavar="S",
-    help="Width of the filter that differentiates the log; else 0.2 s.",
+    help="Width of the filter that differentiates the log. Default: 0.2 s.",
 )
-@click.option("--out", metavar="FILE.rrd", help="A recording of both, for `boom view`.")
+@click.option("--out", metavar="FILE.rrd", help="Write a recording of both for `boom view`.")
 @payload_option
 @payload_as_option
 @boom_option
@@ -99,10 +99,11 @@ def compare(
     boom_file: str | None,
     as_json: bool,
 ) -> int:
-    """Hold a measured motion against its plan: where joints and tip were, and what torques that takes.
+    """Compare a measured motion with its plan: joints, tip and torques.
 
-    PLANNED and MEASURED are CSV or Parquet files. MEASURED holds t, q1..q5 in SI, and any of qd1..qd5, qdd1..qdd5 and
-    tau1..tau5; derivatives that it lacks come from a Savitzky-Golay filter, whose noise is reported.
+    PLANNED and MEASURED are CSV or Parquet files. MEASURED has the columns t and q1..q5 in SI, and
+    optionally qd1..qd5, qdd1..qdd5 and tau1..tau5. A Savitzky-Golay filter computes missing
+    derivatives; their noise is reported.
 
     \b
     Example:
@@ -146,7 +147,7 @@ def compare(
 @click.command()
 @json_option
 def validate(as_json: bool) -> int:
-    """The thesis's tables 2-5 to 2-8 and 3-2 and its sections 3.5 and 3.6, row by row, against this model.
+    """Compare the model with the thesis, row by row: tables 2-5 to 2-8, 3-2; sections 3.5, 3.6.
 
     \b
     Example:
@@ -188,8 +189,8 @@ def _print_comparison(answer: dict[str, Any]) -> None:
     from planner.experiments.comparison import POSITION_HEADER, TORQUE_HEADER, position_cells, summary, torque_cells
 
     for title, header, cells in (
-        ("Positions, measured less planned", POSITION_HEADER, position_cells),
-        ("Torques on level ground: the model's of the measured motion less the plan's, and the log's less the model's",
+        ("Positions, measured minus planned", POSITION_HEADER, position_cells),
+        ("Torques on level ground: model of the measured motion minus plan, and log minus that model",
          TORQUE_HEADER, torque_cells),
     ):  # fmt: skip
         click.echo(title)

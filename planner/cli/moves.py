@@ -1,4 +1,4 @@
-"""Jobs on one move: plan it, compare its profiles, its torques, and the checks of any motion."""
+"""The commands that plan a move, compare profiles, and compute torques and checks of a motion."""
 
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ from planner.cli.options import (
     picture_option,
     report_option,
     vehicle_option,
+    with_names,
 )
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
 from planner.move_spec import MoveSpec, MoveWords
@@ -34,11 +35,11 @@ if TYPE_CHECKING:
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -0.5 is a number
 @move_options()
 @payload_option
-@click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
-@click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
+@click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="Recording to write, for `boom view`.")
+@click.option("--csv", "csv_file", metavar="FILE.csv", help="Write the motion with its torques.")
 @report_option
 @picture_option
-@click.option("--show-reach", is_flag=True, help="Draw the workspace under --pitch and --constraint in the recording.")
+@click.option("--show-reach", is_flag=True, help="Add the workspace with --pitch and --constraint to the recording.")
 @boom_option
 @all_option
 @json_option
@@ -56,8 +57,8 @@ def plan(
 ) -> int:
     """Plan a move, check it against limits and drives, and record it.
 
-    START and GOAL are a named pose (transport, phenotyping), a joint position q=YAW,INNER,LOWER,EXTENSION,WRIST, or a tip
-    target tip=X,Y,Z.
+    START and GOAL are a named pose (transport, phenotyping), a joint position
+    q=YAW,INNER,LOWER,EXTENSION,WRIST, or a tip target tip=X,Y,Z.
 
     \b
     Examples:
@@ -78,11 +79,11 @@ def plan(
     written = {"recording": out, "csv": csv_file, "picture": picture, "report": document}
     _write(files, planned, report, written, spec if show_reach else None)
     asked = f"{move.start} to {move.goal}, {report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg"
-    return print_report(report, asked, _given(written), as_json, whole, f"boom view {out}")
+    return print_report(report, asked, with_names(written), as_json, whole, f"boom view {out}")
 
 
 def _planned(boom: Boom, spec: MoveSpec, as_json: bool) -> "Move":
-    """The planned move; where there is none, the changes that would make it possible are printed first."""
+    """Return the planned move. If it is infeasible, print the possible fixes and raise."""
     from planner.planning import plan_move
 
     try:
@@ -106,7 +107,10 @@ def _fixes(boom: Boom, spec: MoveSpec) -> tuple[str, ...]:
 def _write(
     files: "Outputs", move: "Move", report: "Report", written: dict[str, str | None], workspace: MoveSpec | None = None
 ) -> None:
-    """Write the files of a move that have a name; with the workspace of a description, it is in the recording."""
+    """Write the output files of a move, where they have a name.
+
+    The recording includes the workspace of a description, if one is given.
+    """
     from planner.motion.trajectory import write_csv
 
     recording, csv_file, picture, document = (written.get(kind) for kind in ("recording", "csv", "picture", "report"))
@@ -139,14 +143,10 @@ def _workspace(boom: Boom, spec: MoveSpec | None) -> Any:
     return reach_map(boom, spec.constraint, spec.pitch)
 
 
-def _given(written: dict[str, str | None]) -> dict[str, str]:
-    return {kind: name for kind, name in written.items() if name is not None}
-
-
 @click.command(context_settings={"ignore_unknown_options": True})
 @move_options("profile", "via_velocity", "along", "duration", "jerk_bound", "average_torque", "rate", "vehicle")
 @payload_option
-@click.option("--out", metavar="FILE.rrd", help="A recording of all of them over each other, for `boom view`.")
+@click.option("--out", metavar="FILE.rrd", help="Write a recording with all profiles for `boom view`.")
 @boom_option
 @json_option
 def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file: str | None, as_json: bool) -> int:
@@ -183,15 +183,16 @@ def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file:
 
 @click.command()
 @click.argument("motion", metavar="IN")
-@click.option("--out", required=True, metavar="OUT", help="The motion with its torques: .csv, .parquet, .yaml or .json.")
+@click.option("--out", required=True, metavar="OUT", help="Motion with torques to write: .csv, .parquet, .yaml or .json.")
 @payload_option
 @payload_as_option
 @boom_option
 @json_option
 def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
-    """Compute the torque of each joint at each sample of a motion, with friction where the boom's file gives it.
+    """Compute the torque of each joint at each sample of a motion.
 
-    IN is a CSV or Parquet file that holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
+    Torques include friction if the boom file has friction data. IN is a CSV or Parquet file with
+    the columns t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t and q1..q5 only.
 
     \b
     Example:
@@ -226,7 +227,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 @payload_option
 @payload_as_option
 @vehicle_option
-@click.option("--out", metavar="FILE.rrd", help="A recording of the motion, for `boom view`.")
+@click.option("--out", metavar="FILE.rrd", help="Write a recording of the motion for `boom view`.")
 @report_option
 @picture_option
 @boom_option
@@ -244,7 +245,9 @@ def check(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Check any motion against the joint limits and the drives' datasheets. IN is a CSV or Parquet file.
+    """Check a motion against joint limits and drive datasheets.
+
+    IN is a CSV or Parquet file.
 
     \b
     Example:
@@ -262,4 +265,4 @@ def check(
     _write(files, move, move.report, written)
     asked = f"{motion}, {move.report.duration:.3f} s, payload {boom.payload.mass:g} kg"
     then = f"boom check {motion} --out checked.rrd" if out is None else f"boom view {out}"
-    return print_report(move.report, asked, _given(written), as_json, whole, then)
+    return print_report(move.report, asked, with_names(written), as_json, whole, then)

@@ -213,7 +213,7 @@ class PathLoads:
         return PathLoads(boom, path, make_interp_spline(s, np.stack([demands.a, demands.b, demands.c], axis=1), k=1))
 
     def stretch(self, law: TimeLaw, t: Array, floor: float) -> float:
-        """Return the smallest factor, at least `floor`, with which a law respects the limits at t (n,)."""
+        """Return the smallest factor >= `floor` with which a law respects the limits at t (n,)."""
         s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
         s, v, u = np.clip(s, 0.0, 1.0), v[:, None], u[:, None]
         p1 = self.path(s, 1)
@@ -252,7 +252,8 @@ def _drive_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array, rubbing: Array) 
 def _drive_stretch(boom: Boom, least: float, qd: Array, qdd: Array, static: Array, dynamic: Array, rubbing: Array) -> float:
     """Return the smallest factor k >= `least` with which a law respects the drive limits.
 
-    Its torques are static + dynamic / k^2 + friction. Return `least` if a drive cannot even hold the static load.
+    Its torques are static + dynamic / k^2 + friction. Return `least` if a drive cannot even hold
+    the static load.
     """
     zero = np.zeros_like(qd)
     if (_drive_ratio(boom, static, zero, zero, rubbing) >= 1.0).any():
