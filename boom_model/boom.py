@@ -74,10 +74,12 @@ class Geometry:
 
     @property
     def L5(self) -> float:
+        """Upper side of the parallelogram, equal to L3 [m]."""
         return self.L3
 
     @property
     def L9(self) -> float:
+        """Side of the parallelogram equal to L4 [m]."""
         return self.L4
 
 
@@ -233,24 +235,29 @@ class Boom:
 
     @staticmethod
     def load(path: str | Path | None = None, catalogue: str | Path | None = None) -> "Boom":
-        """The third-generation boom (thesis, Appendix C and table 2-3), or one described by a TOML file of the same form.
+        """Read a boom from a TOML file.
+
+        The shipped file describes the third-generation boom (thesis, Appendix C and table 2-3).
 
         Args:
-            path: a boom's TOML file; None is the shipped `boom_model/data/third_generation.toml`.
-            catalogue: a TOML file of drives of the user's own, beside the shipped ones.
+            path: the file; None is the shipped `boom_model/data/third_generation.toml`.
+            catalogue: a TOML file with more drives, besides the shipped ones.
 
         Raises:
-            InputError: the file cannot be read, is malformed, or names unknown keys or drives; the key is named.
+            InputError: the file cannot be read, is malformed, or has unknown keys or drives; the
+                message names the key.
         """
         from boom_model.boom_file import read_boom
 
         return read_boom(path, catalogue)
 
     def with_payload(self, mass: float) -> "Boom":
-        """The same boom with a payload of another mass [kg]: same centre of mass, inertia in proportion.
+        """Return the boom with another payload mass [kg].
+
+        The centre of mass stays, and the inertia changes in proportion.
 
         Raises:
-            InputError: not finite, negative or beyond what is plausible.
+            InputError: the mass is not finite, negative or not plausible.
         """
         mass = scalar("payload", mass)
         MASS.require("payload", mass)
@@ -259,10 +266,13 @@ class Boom:
         return replace(self, payload=Body(mass, old.com, read_only(inertia)))
 
     def with_body_mass(self, name: str, mass: float) -> "Boom":
-        """The same boom with a body of another mass [kg]: same centre of mass, inertia in proportion.
+        """Return the boom with another mass [kg] of a body.
+
+        The centre of mass stays, and the inertia changes in proportion.
 
         Raises:
-            InputError: no such body, a mass that is not finite or not plausible, or a body without mass to scale.
+            InputError: the body is unknown or has no mass to scale, or the mass is not finite or
+                not plausible.
         """
         if name not in self.bodies:
             raise InputError(f"unknown body {name!r}; there are: {', '.join(self.bodies)}")
@@ -275,13 +285,15 @@ class Boom:
         return replace(self, bodies=MappingProxyType({**self.bodies, name: changed}))
 
     def with_drive(self, joint: str, drive: Drive | LinearDrive | None) -> "Boom":
-        """The same boom with another drive on a joint; the mass of the bodies stays as it is.
+        """Return the boom with another drive on a joint. The masses of the bodies stay unchanged.
 
         Args:
-            drive: a linear drive replaces the boom's actuator; None leaves the joint without a drive.
+            joint: name of the joint.
+            drive: the drive; a linear drive replaces the actuator of the boom. None leaves the
+                joint without a drive.
 
         Raises:
-            InputError: no such joint, or a linear drive on a joint that turns.
+            InputError: the joint is unknown, or a linear drive is given for a rotary joint.
         """
         if joint not in JOINTS:
             raise InputError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
@@ -292,10 +304,10 @@ class Boom:
         return replace(self, drives=tuple(drive if name == joint else d for name, d in zip(JOINTS, self.drives, strict=True)))
 
     def pose(self, name: str) -> Array:
-        """The named pose, (5,).
+        """Return a named pose, (5,).
 
         Raises:
-            InputError: no such pose; lists those there are.
+            InputError: the pose is unknown; the message lists the known ones.
         """
         try:
             return self.poses[name]

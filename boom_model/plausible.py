@@ -28,14 +28,14 @@ class Range(GroupedMetadata):
     unit: str
 
     def __iter__(self) -> Iterator[object]:
-        """What pydantic holds a number to; one below 1e-12 is what rounding has left of a zero."""
+        """Return the constraints for pydantic. A number below 1e-12 is a rounded zero, and becomes 0."""
         return iter((AllowInfNan(False), Ge(self.low), Le(self.high), AfterValidator(_without_rounding)))
 
     def require(self, name: str, values: ArrayLike) -> None:
-        """Whether every value is within the bounds.
+        """Check that every value is within the bounds.
 
         Raises:
-            InputError: one is not, or is NaN; names it, its value and the bounds.
+            InputError: a value is outside or NaN; the message has name, value and bounds.
         """
         array = np.asarray(values, dtype=float)
         outside = ~((array >= self.low - abs(self.low) * _ROUNDING) & (array <= self.high + abs(self.high) * _ROUNDING))
@@ -44,7 +44,7 @@ class Range(GroupedMetadata):
             raise InputError(f"{name} is {value:g}{unit}; it must be between {self.low:g} and {self.high:g}{unit}")
 
     def require_radians(self, name: str, values: ArrayLike) -> None:
-        """The same for angles in radians, where the bounds are in degrees.
+        """Check angles in radians against bounds in degrees.
 
         Raises:
             InputError: as `require`.

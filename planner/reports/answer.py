@@ -81,7 +81,7 @@ def joint_table(report: Report) -> tuple[tuple[str, ...], ...]:
 
 
 def _headline(rows: Sequence[Row]) -> str:
-    """The largest moment on the mount, or what the drives move the tip."""
+    """Return the largest moment on the mount, or the largest tip deflection from the drives."""
     wanted = ("peak moment", "deflection in all")
     return next((cells(row)[2] for row in rows if row.check in wanted and row.demand is not None), "-")
 
@@ -121,7 +121,7 @@ def _in_words(report: Report) -> str:
 
 
 def _findings(report: Report) -> Iterable[str]:
-    """A line for each check that FAILs or WARNs, with the numbers of every joint."""
+    """Yield a line for each check that FAILs or WARNs, with the numbers of every joint."""
     for verdict in (Verdict.FAIL, Verdict.WARN):
         rows = sorted((row for row in report.rows if row.verdict is verdict), key=lambda row: row.check)
         for check, same in groupby(rows, key=lambda row: row.check):
@@ -130,7 +130,7 @@ def _findings(report: Report) -> Iterable[str]:
 
 
 def _numbers(row: Row) -> str:
-    """The demand and its limit, in people's units."""
+    """Return demand and limit with their units."""
     demand, limit = cells(row)[2:4]
     return demand if limit == "-" else f"{demand} of {limit}"
 
