@@ -47,10 +47,10 @@ LOAD_UNITS = tuple("N" if length else "Nm" for length in IS_LENGTH)
 """Unit of each joint's torque; the extension's is a force."""
 
 MOVING_BODIES = ("lower", "inner", "outer", "upper", "extension", "end_effector")
-"""Bodies that move against the yawing base; the payload moves with the end effector."""
+"""Bodies that move relative to the yawing base. The payload moves with the end effector."""
 
 LIMIT_TOLERANCE = 1e-9
-"""Slack [rad or m] of every comparison with a position limit: rounding is not a violation."""
+"""Tolerance [rad or m] of every comparison with a position limit, for rounding."""
 
 
 _LENGTHS = {"L1": OFFSET, "L2": OFFSET, "L3": LENGTH, "L4": LENGTH, "L6": OFFSET, "L7": LENGTH, "L8": WIDTH}
@@ -58,7 +58,7 @@ _LENGTHS = {"L1": OFFSET, "L2": OFFSET, "L3": LENGTH, "L4": LENGTH, "L6": OFFSET
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Lengths [m] of the thesis's figure 2-1. L5 = L3 and L9 = L4: the linkage is a parallelogram."""
+    """Lengths [m] (thesis, figure 2-1). L5 = L3 and L9 = L4, as the linkage is a parallelogram."""
 
     L1: float
     L2: float
@@ -74,12 +74,12 @@ class Geometry:
 
     @property
     def L5(self) -> float:
-        """Upper side of the parallelogram, equal to L3 [m]."""
+        """Side of the parallelogram on the upper link, equal to L3 [m]."""
         return self.L3
 
     @property
     def L9(self) -> float:
-        """Side of the parallelogram equal to L4 [m]."""
+        """Side of the parallelogram on the inner link, equal to L4 [m]."""
         return self.L4
 
 
@@ -120,9 +120,10 @@ class Limits:
     linkage: float
     """Coupled limit: theta3 - theta2 may not fall below this [rad]."""
     transmission: float
-    """Transmission angle [rad] below which the flattening parallelogram's pin forces deserve a warning."""
+    """Transmission angle [rad] below which pin forces become large, with a warning."""
     origins: Mapping[str, tuple[Origin, ...]]
-    """Origin of every figure: keys position, velocity, acceleration and jerk (5 each), linkage and transmission (1)."""
+    """Origin of every value, with the keys position, velocity, acceleration and jerk (5 each), linkage
+    and transmission (1)."""
 
     def __post_init__(self) -> None:
         for name, (angular, linear) in _LIMITS.items():
@@ -133,20 +134,21 @@ class Limits:
         TRANSMISSION_ANGLE.require_radians("transmission", scalar("transmission", self.transmission))
 
     def excess(self, q: ArrayLike) -> Array:
-        """How far q is outside each position limit, shape (..., 6); negative inside.
+        """Return the excess of q (..., 5) over each position limit, (..., 6) [rad, m].
 
-        The last entry is the coupled limit, theta2 + linkage - theta3. Entries in rad, the extension's in m.
+        It is negative inside the limit. The last entry is for the coupled limit: theta2 + linkage -
+        theta3.
         """
         q = np.asarray(q, dtype=float)
         coupled = q[..., 1:2] + self.linkage - q[..., 2:3]
         return np.concatenate([np.maximum(self.lower - q, q - self.upper), coupled], axis=-1)
 
     def contain(self, q: ArrayLike) -> Mask:
-        """Whether q (..., 5) is within every position limit, to LIMIT_TOLERANCE; bool of shape (...)."""
+        """Return whether q (..., 5) is within every position limit, to LIMIT_TOLERANCE, (...)."""
         return np.asarray((self.excess(q) <= LIMIT_TOLERANCE).all(axis=-1))
 
     def reasons(self, q: ArrayLike) -> list[str]:
-        """One sentence for each position limit that q (5,) breaks: which, by how much, and the bound."""
+        """Return a sentence per position limit that q (5,) exceeds, with excess and bound."""
         q = checked("q", q, 5)
         sentences = []
         for i in map(int, np.flatnonzero(self.excess(q)[:5] > LIMIT_TOLERANCE)):
@@ -167,21 +169,21 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Friction:
-    """Joint friction, viscous qd + coulomb sign(qd); arrays (5,), 0 where none is given."""
+    """Joint friction, viscous qd + coulomb sign(qd). Arrays (5,); 0 if not given."""
 
     viscous: Array
-    """[Nm s/rad, the extension's N s/m]"""
+    """[Nm s/rad, N s/m for the extension]"""
     coulomb: Array
-    """[Nm, the extension's N]"""
+    """[Nm, N for the extension]"""
     origins: tuple[Origin | None, ...]
-    """Of each joint's pair; None where none is given."""
+    """Origin of the two values of each joint; None if not given."""
 
     def __post_init__(self) -> None:
         VISCOUS_FRICTION.require("viscous friction", _of_shape("viscous friction", self.viscous, (5,)))
         COULOMB_FRICTION.require("coulomb friction", _of_shape("coulomb friction", self.coulomb, (5,)))
 
     def torque(self, qd: ArrayLike) -> Array:
-        """Return the torque [Nm, the extension's N] that overcomes friction at joint velocities qd (..., 5), same shape."""
+        """Return the torque (..., 5) against friction at joint velocities qd (..., 5) [Nm, N]."""
         qd = np.asarray(qd, dtype=float)
         torque: Array = self.viscous * qd + self.coulomb * np.sign(qd)
         return torque
@@ -189,7 +191,7 @@ class Friction:
 
 @dataclass(frozen=True)
 class Mount:
-    """What the vehicle's mount bears; None where nobody says."""
+    """Largest loads of the mount on the vehicle; None if unknown."""
 
     force: Sourced[float] | None
     """Largest force [N]."""
@@ -209,12 +211,12 @@ class Boom:
     name: str
     geometry: Geometry
     bodies: Mapping[str, Body]
-    """base, and each of MOVING_BODIES."""
+    """The base and each of MOVING_BODIES."""
     payload: Body
-    """In frame 11, the tip."""
+    """Payload, in frame 11 at the tip."""
     limits: Limits
     drives: tuple[Drive | None, ...]
-    """One a joint; None where no drive is given, and then nothing about it can be checked."""
+    """Drive of each joint; None if not given, and then it cannot be checked."""
     poses: Mapping[str, Array]
     """Named joint positions, each (5,)."""
     friction: Friction
@@ -222,9 +224,9 @@ class Boom:
     gravity: float = 9.81
     """[m/s^2]"""
     actuator: LinearDrive | None = None
-    """Linear actuator of the extension; None where none is given, as for drives."""
+    """Linear actuator of the extension; None if not given."""
     keep_out: KeepOut | None = None
-    """What the arm must keep away from; None where nobody says."""
+    """Shapes to avoid; None if not given."""
 
     def __post_init__(self) -> None:
         GRAVITY.require("gravity", scalar("gravity", self.gravity))

@@ -9,7 +9,7 @@ from boom_model.drives.drive import drive_inertia, motor_limit
 
 
 def rotors(boom: Boom) -> Array:
-    """Return eta N^2 (J_rotor + J_gear), (5,): the drive inertia that the motors accelerate [kg m^2]."""
+    """Return the drive inertia eta N^2 (J_rotor + J_gear) at the joints, (5,) [kg m^2]."""
     return np.array([drive_inertia(drive) if drive else 0.0 for drive in boom.drives])
 
 

@@ -1,4 +1,4 @@
-"""The answer about a motion in some fifteen lines: the verdict in words, a line for each joint, and what to look at.
+"""Summary of a report: the verdict, a line for each joint, and the findings.
 
 Terminal, recording, report and notebook show the same lines.
 """
@@ -13,13 +13,13 @@ from planner.checks.rows import Row, Verdict
 from planner.reports.report import Report, cells
 
 JOINT_HEADER = ("joint", "load", "tightest limit", "used", "at", "gearbox", "motor", "verdict")
-"""Columns of `joint_table`. *Used* is the largest demand, with its required margin, divided by the limit; so are the columns
-of the gearbox and the motor."""
+"""Columns of `joint_table`. *Used*, gearbox and motor are the demand, with its required
+margin, divided by the limit."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a motion's report says first."""
+    """Summary of a report."""
 
     verdict: Verdict
     sentence: str
@@ -29,11 +29,11 @@ class Answer:
     findings: tuple[str, ...]
     """Checks that FAIL or WARN, worst first, with their numbers."""
     assumed: int
-    """How many assumed figures enter."""
+    """Number of assumed figures."""
 
 
 def answer(report: Report) -> Answer:
-    """Return the first lines of a report."""
+    """Return the summary of a report."""
     return Answer(
         verdict=report.verdict,
         sentence=f"{report.verdict}: {_in_words(report)}",
@@ -44,10 +44,10 @@ def answer(report: Report) -> Answer:
 
 
 def usage(row: Row) -> float | None:
-    """Return demand (1 + required margin) / limit, the share of a limit that is used; 1 is just allowed.
+    """Return the used share of a limit, demand (1 + required margin) / limit.
 
-    None of a guideline, of a distance to a bound, of a row without a limit, and of a brake: it carries what the gearbox
-    cannot, and its strength is not known.
+    A share of 1 is just allowed. Return None for a guideline, a distance to a bound, a row without
+    a limit, and a brake, which carries what the gearbox cannot and has an unknown strength.
     """
     if row.kind.severity is not Severity.LIMIT or row.kind.margin is not Margin.RATIO or row.kind.part is Part.BRAKE:
         return None
