@@ -8,6 +8,8 @@ import click
 
 from boom_model import Boom, InputError
 from boom_model.plausible import BANDWIDTH, DAMPING, INTEGRAL, PAYLOAD_ERROR, TIP_TOLERANCE
+from boom_model.words import unknown
+from planner.cli.completion import OutFile
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -90,7 +92,7 @@ if TYPE_CHECKING:
     "--set", "figures", multiple=True, metavar="NAME=VALUE",
     help="Replace an assumed figure of the report, such as rate_Hz or structural_damping; repeatable.",
 )  # fmt: skip
-@click.option("--out", metavar="FILE.rrd", help="Write a recording for `boom view`.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording for `boom view`.")
 @click.option("--loops", metavar="FILE.png", help="Write a picture with Bode diagrams and poles.")
 @click.option("--errors", metavar="FILE.png", help="Write a picture with the tip errors.")
 @report_option
@@ -254,5 +256,5 @@ def _several(what: str, text: str, known: Sequence[str]) -> list[str]:
     names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         if name not in known:
-            raise InputError(f"{what} is {name!r}; there are: {', '.join(known)}, or all")
+            raise unknown(what, name, known, "all")
     return names

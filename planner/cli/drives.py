@@ -7,6 +7,7 @@ import click
 
 from boom_model import Boom, InfeasibleError, InputError
 from boom_model.plausible import VOLTAGE
+from planner.cli.completion import OneOf, joints, missions
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -35,8 +36,14 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
-@click.option("--joint", "joints", multiple=True, help="Compare only the drive checks of this joint; repeatable.")
+@click.argument("missions", metavar="MISSION...", nargs=-1, required=True, shell_complete=missions)
+@click.option(
+    "--joint",
+    "joints",
+    multiple=True,
+    shell_complete=joints,
+    help="Compare only the drive checks of this joint; repeatable.",
+)
 @payload_option
 @payload_as_option
 @vehicle_option
@@ -152,8 +159,10 @@ def _print_compared(
 
 
 @click.command()
-@click.argument("mission", default="field-day")
-@click.option("--joint", "joints", multiple=True, help="Joint to size; repeatable. Default: every joint.")
+@click.argument("mission", default="field-day", shell_complete=missions)
+@click.option(
+    "--joint", "joints", multiple=True, shell_complete=joints, help="Joint to size; repeatable. Default: every joint."
+)
 @click.option(
     "--voltage",
     "voltages",
@@ -164,9 +173,13 @@ def _print_compared(
     help="Bus voltage to try; repeatable.",
 )
 @click.option(
-    "--adapt", type=click.Choice(["nothing", "rescale", "replan"]), default="nothing", show_default=True,
+    "--adapt",
+    type=OneOf(["nothing", "rescale", "replan"]),
+    metavar="nothing|rescale|replan",
+    default="nothing",
+    show_default=True,
     help="Adapt the motion to each drive: rescale slows every move, replan plans them again.",
-)  # fmt: skip
+)
 @click.option(
     "--variant", "variants", multiple=True, metavar="BODY=KG,...",
     help="Also size for a boom with other masses, such as inner=5.55,payload=5; repeatable.",
@@ -220,6 +233,7 @@ def size(
         print_lines(None, [f"mission {asked.name}, payload {boom.payload.mass:g} kg"])
         _print_choices(choices, notes, whole)
         print_files(written)
+        print_lines("next", [] if whole else [f"boom size {mission} --report drives.pdf"])
     unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]
     if unmet:
         complain(f"no drive of the catalogue is suitable for the mission: {'; '.join(unmet)}")
@@ -260,14 +274,25 @@ def _write_sizing(
 
 
 def _print_choices(choices: Sequence["Choice"], notes: Sequence[str], whole: bool) -> None:
-    """Print the saved mass per joint, and with `whole` every drive and note."""
-    from planner.sizing.tables import SAVING, motors, no_motion, not_checked, ranking, saving
+    """Print the conclusion and the best drive per joint, and with `whole` every drive and note."""
+    from planner.sizing.tables import (
+        SAVING,
+        answer_rows,
+        conclusion,
+        motors,
+        no_motion,
+        not_checked,
+        ranking,
+        saving,
+    )
 
-    print_rows(SAVING, saving(choices))
+    print_lines(None, conclusion(choices))
+    print_rows(*answer_rows(choices), drop=("fitted", "mass"))
     if not whole:
         print_lines("not checked", (f"{joints}: {reason}" for joints, reason in not_checked(choices)))
         print_lines(None, [f"{len(notes)} notes, every drive ranked: --all lists them"])
         return
+    print_rows(SAVING, saving(choices))
     for choice in (choice for choice in choices if choice.judged):
         print_lines(None, [f"{choice.joint}, {choice.variant}"])
         print_rows(*ranking(choice), drop=("warnings", "moving", "mass"))

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boom_model import Boom, InfeasibleError, InputError
+from planner.cli.completion import OneOf, OutFile
 from planner.cli.options import (
+    all_option,
     boom_option,
     given_catalogue,
     json_option,
@@ -34,17 +36,21 @@ _TASK_OPTIONS: tuple[Callable[[_Command], _Command], ...] = (
     click.option(
         "--link", "name", default="inner", show_default=True, metavar="inner|lower|outer|extension", help="Link to design."
     ),
-    click.option("--links", metavar="FILE.toml", help="File of plates and fittings; default: the shipped one."),
+    click.option(
+        "--links", type=click.Path(), metavar="FILE.toml", help="File of plates and fittings; default: the shipped one."
+    ),
     click.option(
         "--load",
-        type=click.Choice(["moves", "thesis"]),
+        type=OneOf(["moves", "thesis"]),
+        metavar="moves|thesis",
         default="moves",
         show_default=True,
         help="moves: every sample of the moves. thesis: the load case of the thesis.",
     ),
     click.option(
         "--method",
-        type=click.Choice(["exact", "thesis"]),
+        type=OneOf(["exact", "thesis"]),
+        metavar="exact|thesis",
         default="exact",
         show_default=True,
         help="exact: least mass by optimality conditions. thesis: two-stage search of the thesis.",
@@ -110,17 +116,31 @@ def task_options(command: _Command) -> _Command:
 @click.command()
 @task_options
 @click.option("--move", "moves", nargs=2, multiple=True, metavar="START GOAL", help="Move that loads the link; repeatable.")
-@click.option("--motion", "motions", multiple=True, metavar="FILE.csv", help="Motion that loads the link; repeatable.")
+@click.option(
+    "--motion",
+    "motions",
+    type=click.Path(),
+    multiple=True,
+    metavar="FILE.csv",
+    help="Motion that loads the link; repeatable.",
+)
 @payload_option
-@click.option("--out", metavar="FILE.rrd", help="Write a recording of the design.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording of the design.")
 @click.option("--picture", metavar="FILE.png", help="Write a picture with contour, stress, convergence, torque and mass.")
 @report_option
 @click.option("--convergence", is_flag=True, help="Add convergence studies over slices, delta-H and elements to the JSON.")
 @click.option("--contour", metavar="FILE.txt", help="Write the contour as lines of x, H/2, 0 for a CAD curve.")
-@click.option("--csv", "csv_file", metavar="FILE.csv", help="Write heights, sections, forces and stress at the stations.")
+@click.option(
+    "--csv",
+    "csv_file",
+    type=OutFile(".csv"),
+    metavar="FILE.csv",
+    help="Write heights, sections, forces and stress at the stations.",
+)
 @click.option("--dxf", metavar="FILE.dxf", help="Write the outline of one plate in millimetres.")
 @click.option("--out-boom", metavar="FILE.toml", help="Write the boom with the new link, for `boom plan --boom`.")
 @boom_option
+@all_option
 @json_option
 def link(
     task: "LinkTask",
@@ -136,6 +156,7 @@ def link(
     dxf: str | None,
     out_boom: str | None,
     boom_file: str | None,
+    whole: bool,
     as_json: bool,
 ) -> int:
     """Design the lightest link within limits on stress, deflection and buckling.
@@ -171,16 +192,16 @@ def link(
         raise
     written = with_names(named | {"report": document})
     _write(files, design, written, boom_file)
-    _print_design(design, written, as_json, convergence)
+    _print_design(design, written, whole, as_json, convergence)
     return 0
 
 
 def _loading(boom: Boom, moves: Sequence[tuple[str, str]], motions: Sequence[str], planning: Any) -> list["Trajectory"]:
     """Return the motions that load the link: from files, and from moves with every profile."""
-    from planner.motion.trajectory import read_csv
+    from planner.motion.motion_files import read_motion
     from planner.planning import plan_each_profile
 
-    trajectories = [read_csv(motion) for motion in motions]
+    trajectories = [read_motion(motion) for motion in motions]
     for start, goal in moves:
         trajectories += plan_each_profile(boom, parse_target(start), parse_target(goal), planning)
     return trajectories
@@ -218,7 +239,7 @@ def _write(files: "Outputs", design: "LinkDesign", written: dict[str, str], boom
                 write_document(place, to_markdown(design), link_pictures(design))
 
 
-def _print_design(design: "LinkDesign", written: dict[str, str], as_json: bool, convergence: bool) -> None:
+def _print_design(design: "LinkDesign", written: dict[str, str], whole: bool, as_json: bool, convergence: bool) -> None:
     from planner.links import report as link_report
 
     if as_json:
@@ -230,12 +251,19 @@ def _print_design(design: "LinkDesign", written: dict[str, str], as_json: bool, 
         print_json(answer)
         return
     print_lines(None, [link_report.title(design)])
-    for header, rows in (
-        (link_report.ROWS_HEADER, link_report.rows(design)),
+    rows = link_report.rows(design)
+    checks = [row for row in rows if row[0].startswith("check:")]
+    for header, shown in (
+        (link_report.ROWS_HEADER, rows if whole else [row for row in rows if row not in checks]),
         (link_report.MOTORS_HEADER, link_report.motor_rows(design)),
     ):
-        if rows:
-            print_rows(header, rows)
+        if shown:
+            print_rows(header, shown)
     print_lines(None, link_report.sentences(design))
-    print_lines("note", design.notes)
+    print_lines("warning", design.warnings)
+    if whole:
+        print_lines("note", design.notes)
+    else:
+        print_lines(None, [f"{len(checks)} checks by finite elements, {len(design.notes)} notes: --all lists them"])
     print_files(written)
+    print_lines("next", [] if "boom" in written else ["boom link --out-boom lighter.toml"])

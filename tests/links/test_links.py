@@ -198,7 +198,7 @@ def test_the_command_for_people_and_its_moves(boom):
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        (("--deflection", "0"), 2, "deflection is 0 m; it must be between 1e-06 and 10 m"),
+        (("--deflection", "0"), 2, "deflection is 0 m; it must be between 1e-06 and 1 m"),
         (("--min-height", "0.2", "--max-height", "0.1"), 2, "minimum height 0.2 m is not below the maximum of 0.1 m"),
         (("--slices", "1"), 2, "slices is 1; it must be a whole number of at least 2"),
         (("--safety-factor", "nan"), 2, "safety factor is nan"),

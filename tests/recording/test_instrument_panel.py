@@ -30,6 +30,7 @@ from planner.recording.palette import LIGHT
 from planner.recording.reach import boundary
 from planner.recording.torque_ratio import torque_ratios, worst_ratio
 from planner.reports.report import cells
+from tests.builders import without_drives
 
 BOOM = Boom.load()
 FLOAT32 = 5e-7
@@ -161,7 +162,7 @@ def test_an_actuators_force_counts_against_its_peak_force(move: Move):
 
 
 def test_without_drives_the_path_says_so(tmp_path: Path):
-    bare = plan(replace(BOOM, drives=(None,) * 5), "transport", "phenotyping", step=0.1)
+    bare = plan(without_drives(BOOM), "transport", "phenotyping", step=0.1)
     panel = read(tmp_path, bare)
     assert panel.static("/world/tip_path", "LineStrips3D:colors") == [packed(LIGHT)]
     assert panel.static("/legend/0/name", "Points2D:labels") == ["no drive limit is known"]
@@ -394,7 +395,7 @@ def boom(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
 def test_profiles_are_recorded_by_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Any):
     monkeypatch.chdir(tmp_path)
     assert boom(monkeypatch, "profiles", "transport", "transport", "--out", "none.rrd") == 0  # empty moves
-    assert capsys.readouterr().out.endswith("recording: none.rrd\n")
+    assert capsys.readouterr().out.splitlines()[-2] == "recording: none.rrd"
     assert boom(monkeypatch, "profiles", "transport", "phenotyping", "--json", "--out", "all.rrd") == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["files"] == {"recording": "all.rrd"}

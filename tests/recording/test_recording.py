@@ -27,6 +27,7 @@ from boom_model.provenance import Basis, Origin
 from planner.motion.vehicle import base_pose, load_case
 from planner.planning import Move, plan
 from planner.recording import write_recording
+from tests.builders import without_drives
 
 BOOM = Boom.load()
 FLOAT32 = 5e-7  # of positions up to 3 m and of rotations, once rounded to float32
@@ -154,7 +155,7 @@ def test_the_tips_budget_and_the_drives_page_are_there(recorded: Recorded):
 
 
 def test_a_boom_without_motors_has_no_page(tmp_path: Path):
-    bare = replace(BOOM, drives=(None,) * 5)
+    bare = without_drives(BOOM)
     recording = Recorded(tmp_path / "bare.rrd", plan(bare, "transport", "phenotyping", step=0.1))
     write(recording.path, recording.move)
     assert not [name for name in recording.entities() if "drives" in name or "motor" in name]
