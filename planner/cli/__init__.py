@@ -36,14 +36,14 @@ def main() -> None:
 
 
 _QUESTIONS = """\
-Can the boom make this move, and with what load on its drives?
+Can the boom make a move, and are its drives strong enough?
   boom plan transport phenotyping
 Which motors and gearboxes are suitable for a day in the field?
   boom size field-day
 How light may a link be?
   boom link
 
-`boom info` shows the boom, `boom --help` lists the commands."""
+`boom info` shows the boom, `boom --help` every command."""
 
 
 class _Commands(click.Group):

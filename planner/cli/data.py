@@ -34,19 +34,21 @@ def info(boom_file: str | None, as_json: bool) -> int:
         return 0
     g = boom.geometry
     longest = g.L2 + g.L4 + g.L7 + float(boom.limits.upper[3]) + g.L8
-    click.echo(f"{boom.name}: reach up to {longest:.2f} m, payload {boom.payload.mass:g} kg, {_moving(boom):.2f} kg move")
+    print_lines(
+        None, [f"{boom.name}: reach up to {longest:.2f} m, payload {boom.payload.mass:g} kg, {_moving(boom):.2f} kg move"]
+    )
     rows = []
     for i, joint in enumerate(JOINTS):
         low, high, speed, push, jerk = (_shown(i, value) for value in _limits(boom, i))
         rows.append((joint, f"{low} to {high} {'m' if IS_LENGTH[i] else 'deg'}", speed, push, jerk, _drive(boom, i)))
     print_rows(("joint", "range", "speed/s", "acc/s2", "jerk/s3", "drive"), rows, drop=("jerk/s3",))
-    click.echo(f"basis of speeds, accelerations and jerks: {', '.join(_bases(boom))}")
-    click.echo(f"lower - inner stays above {np.degrees(boom.limits.linkage):g} deg")
+    print_lines(None, [f"basis of speeds, accelerations and jerks: {', '.join(_bases(boom))}"])
+    print_lines(None, [f"lower - inner stays above {np.degrees(boom.limits.linkage):g} deg"])
     for name in sorted(boom.poses):
         tip = forward_kinematics(boom, boom.poses[name])
         x, y, z = tip.position
-        click.echo(f"pose {name}: {_pose(boom, name)}")
-        click.echo(f"  tip at {x:.3f}, {y:.3f}, {z:.3f} m")
+        print_lines(None, [f"pose {name}: {_pose(boom, name)}"])
+        print_lines(None, [f"  tip at {x:.3f}, {y:.3f}, {z:.3f} m"])
     print_lines("next", ["boom fk phenotyping; boom new mine.toml"])
     return 0
 

@@ -206,7 +206,7 @@ def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file:
     if as_json:
         print_json({"profiles": [asdict(row) for row in rows], "refused": refused, "files": written})
     else:
-        click.echo(f"{move.start} to {move.goal}, payload {boom.payload.mass:g} kg; each ratio is demand / limit")
+        print_lines(None, [f"{move.start} to {move.goal}, payload {boom.payload.mass:g} kg; each ratio is demand / limit"])
         print_rows(
             HEADER,
             map(cells, rows),

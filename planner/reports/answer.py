@@ -39,7 +39,7 @@ def answer(report: Report) -> Answer:
     failed = _failed(report)
     return Answer(
         verdict=report.verdict,
-        sentence=f"{report.verdict}: {'; '.join([failed or 'nothing fails', *_open(report)])}",
+        sentence=f"{report.verdict}: {failed or '; '.join(['nothing fails', *_open(report)])}",
         failed=failed,
         joints=joint_table(report),
         findings=tuple(_findings(report)),
