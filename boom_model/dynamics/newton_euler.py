@@ -84,14 +84,20 @@ def inverse_dynamics(
     drive_inertia: bool = False,
     reactions: bool = True,
 ) -> Loads:
-    """Joint torques, pin forces and mount wrench for a motion, by Newton-Euler (thesis, eqs. 2.45-2.71 as corrected).
+    """Compute joint torques, pin forces and mount wrench of a motion.
+
+    Newton-Euler method (thesis, eqs. 2.45-2.71 as corrected). q, qd and qdd broadcast.
 
     Args:
-        q, qd, qdd: (..., 5) joint positions, velocities, accelerations [rad, the extension in m]; they broadcast.
+        boom: the boom.
+        q: (..., 5) joint positions [rad, m for the extension].
+        qd: (..., 5) joint velocities [rad/s, m/s].
+        qdd: (..., 5) joint accelerations [rad/s^2, m/s^2].
         base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level ground.
         payload_as: "mass" moves the payload with the tip; "force" hangs its weight there and leaves its inertia out, as the
             thesis does.
-        tip_force, tip_moment: (..., 3) force [N] and moment [Nm] that the surroundings put on the tip, along frame 1.
+        tip_force: (..., 3) external force on the tip, along frame 1 [N].
+        tip_moment: (..., 3) external moment on the tip, along frame 1 [Nm].
         friction: whether tau overcomes the joints' friction, viscous qd + coulomb sign(qd).
         drive_inertia: whether tau accelerates the drives' reflected inertia N^2 (J_rotor + J_gear) too, where it is known.
             Friction and drive inertia are added to tau alone; their reaction on the pins and the mount is left out.
@@ -186,7 +192,7 @@ def _model(boom: Boom, payload_as: PayloadAs) -> _Model:
 
 
 def _elements(boom: Boom) -> dict[str, Array]:
-    """g of each body's frame origin, and what a metre along its link's e, p and n adds: (4, 11) a body."""
+    """Return g of each body's frame origin, and its change per metre along e, p and n, (4, 11)."""
     g, unit = boom.geometry, np.eye(11)
     shoulder = unit[_O] + g.L2 * unit[_X] + g.L1 * unit[_Z]
     pin6 = shoulder + g.L3 * unit[_E3]
@@ -206,7 +212,7 @@ def _elements(boom: Boom) -> dict[str, Array]:
 
 
 def _pseudo_inertia(body: Body, R: Array) -> Array:
-    """int (1, r) (1, r)^T dm over a body, r along its link's axes: (4, 4)."""
+    """Return int (1, r) (1, r)^T dm over a body, r along the axes of its link: (4, 4)."""
     com, inertia = R @ body.com, R @ body.inertia @ R.T
     moments = np.empty((4, 4))
     moments[0, 0] = body.mass
@@ -234,7 +240,7 @@ def _state(*motion: Array) -> _State:
 
 
 def _columns(vectors: Array) -> Sequence[_Value]:
-    """The x, y and z of vectors (n, 3)."""
+    """Return x, y and z of vectors (n, 3)."""
     return vectors[0].tolist() if len(vectors) == 1 else list(vectors.T)
 
 
@@ -279,7 +285,7 @@ def _vectors(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def _into_plane(state: _State, vector: Sequence[_Value]) -> tuple[_Value, _Value, _Value]:
-    """A vector along frame 1 to x, z and n of the plane."""
+    """Return the components of a vector, given along frame 1, along x, z and n of the plane."""
     c, s = _cosine_and_sine(state.q[0])
     return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
 
@@ -299,7 +305,9 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
 
 
 def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> Array:
-    """A, the acceleration of each vector b: (3, 11, n) along x, z and n, or (3, 11) of a single state.
+    """Return A, the acceleration of each vector b, along x, z and n.
+
+    Its shape is (3, 11, n), or (3, 11) for a single state.
 
     C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
     """
@@ -335,7 +343,7 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
 
 
 def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied, out: _Outputs) -> None:
-    """Fills the outputs of a chunk."""
+    """Fill the outputs of a chunk."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
     (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[1], q[2], q[2] + q[4]))
@@ -351,7 +359,7 @@ def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied
     moment = (0.0, 0.0, 0.0) if applied.moment is None else applied.moment
 
     def about(c: _Value, s: _Value, e: Array, p: Array) -> _Value:
-        """(b_e x U_e + b_p x U_p) . n"""
+        """Return (b_e x U_e + b_p x U_p) . n."""
         turned: _Value = c * (e[1] - p[0]) - s * (e[0] + p[1])
         return turned
 

@@ -59,7 +59,9 @@ def command_line() -> str:
 
 
 def without_pictures(markdown: str) -> str:
-    r"""Return Markdown whose own pictures and tags are plain text: a TOML source could have them loaded from anywhere.
+    r"""Return Markdown with its pictures and tags as plain text.
+
+    Text from a TOML file could otherwise load pictures from any address.
 
     >>> print(without_pictures("![x](http://a/b.png) <img src=c> 1 < 2"))
     !\[x](http://a/b.png) \<img src=c> 1 < 2
