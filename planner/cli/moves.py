@@ -108,7 +108,7 @@ def plan(
     if report.verdict == "FAIL":
         report = replace(report, suggestions=_fixes(boom, spec))
     written = {"recording": out, "csv": csv_file, "picture": picture, "report": document}
-    _write(files, planned, report, written, spec if show_reach else None)
+    _write(files, planned, report, written, f"{move.start} to {move.goal}", spec if show_reach else None)
     asked = f"{move.start} to {move.goal}, {report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg"
     code = print_report(report, asked, with_names(written), as_json, whole, f"boom view {out}")
     if then_view:
@@ -139,7 +139,12 @@ def _fixes(boom: Boom, spec: MoveSpec) -> tuple[str, ...]:
 
 
 def _write(
-    files: "Outputs", move: "Move", report: "Report", written: dict[str, str | None], workspace: MoveSpec | None = None
+    files: "Outputs",
+    move: "Move",
+    report: "Report",
+    written: dict[str, str | None],
+    title: str,
+    workspace: MoveSpec | None = None,
 ) -> None:
     """Write the output files of a move, where they have a name.
 
@@ -163,10 +168,18 @@ def _write(
         if document is not None:
             from planner.reports.document import write_document
             from planner.reports.drive_pictures import drive_pages
+            from planner.reports.first_page import first_page, first_picture
             from planner.reports.move_pictures import move_pictures
 
             pages = move_pictures(*shown, move.loads.tau) | drive_pages(*shown, move.loads.tau, report)
-            write_document(files.temporary(document), report.to_markdown(), pages)
+            first = first_page(title, _circumstances(move, report), report), first_picture(*shown, move.loads.tau)
+            write_document(files.temporary(document), report.details(), pages, first)
+
+
+def _circumstances(move: "Move", report: "Report") -> str:
+    """Return profile, duration, payload and vehicle of a move in a line."""
+    vehicle = "level ground" if move.vehicle.is_level else move.vehicle.sentence
+    return f"{report.profile}, {report.duration:.3f} s, payload {move.boom.payload.mass:g} kg, {vehicle}"
 
 
 def _workspace(boom: Boom, spec: MoveSpec | None) -> Any:
@@ -312,7 +325,7 @@ def check(
     boom = load_boom(boom_file, payload)
     move = check_motion(boom, read_motion(motion), payload_as=payload_as, vehicle=load_vehicle(vehicle))
     written = {"recording": out, "picture": picture, "report": document}
-    _write(files, move, move.report, written)
+    _write(files, move, move.report, written, f"Motion of {motion}")
     asked = f"{motion}, {move.report.duration:.3f} s, payload {boom.payload.mass:g} kg"
     carried = "" if payload is None else f" --payload {payload:g}"
     then = f"boom check {motion}{carried} --out checked.rrd" if out is None else f"boom view {out}"

@@ -141,7 +141,8 @@ def _findings(report: Report) -> Iterable[str]:
 def _numbers(row: Row) -> str:
     """Return demand and limit with their units."""
     demand, limit = cells(row)[2:4]
-    return demand if limit == "-" else f"{demand} of {limit}"
+    margin = f" and {row.required_margin:.0%}" if row.required_margin > 0.0 else ""
+    return demand if limit == "-" else f"{demand}{margin} of {limit}"
 
 
 def _listed(names: Iterable[str]) -> str:
