@@ -19,8 +19,8 @@ from planner.checks.drives.joint_view import JointView
 from planner.checks.rows import Row
 from planner.control.plant import Plant, spring_energy
 from planner.missions.mission import Cycle, load_mission, plan_cycle
+from planner.motion.trajectory import STEP
 from planner.paths.path import Path
-from planner.planning import STEP
 from planner.reports.report import Report
 from planner.timing.time_law import Motion
 from planner.timing.timing import Timing, timed
@@ -42,8 +42,8 @@ def with_drives(boom: Boom, **changes: Any) -> Boom:
 
 def with_running_torque(boom: Boom, torque: float) -> Boom:
     """The boom with another running torque [Nm] of both its motors."""
-    motors = (drive and replace(drive.motor, running_torque=torque) for drive in boom.drives)
-    return replace(boom, drives=tuple(d and replace(d, motor=m) for d, m in zip(boom.drives, motors, strict=True)))
+    drives = (drive and replace(drive, motor=replace(drive.motor, running_torque=torque)) for drive in boom.drives)
+    return replace(boom, drives=tuple(drives))
 
 
 def with_shapes(

@@ -34,9 +34,8 @@ def info(boom_file: str | None, as_json: bool) -> int:
         return 0
     g = boom.geometry
     longest = g.L2 + g.L4 + g.L7 + float(boom.limits.upper[3]) + g.L8
-    print_lines(
-        None, [f"{boom.name}: reach up to {longest:.2f} m, payload {boom.payload.mass:g} kg, {_moving(boom):.2f} kg move"]
-    )
+    masses = f"payload {boom.payload.mass:g} kg, {_moving(boom):.2f} kg move"
+    print_lines(None, [f"{boom.name}: reach up to {longest:.2f} m, {masses}"])
     rows = []
     for i, joint in enumerate(JOINTS):
         low, high, speed, push, jerk = (_shown(i, value) for value in _limits(boom, i))

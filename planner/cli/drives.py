@@ -7,7 +7,7 @@ import click
 
 from boom_model import Boom, InfeasibleError, InputError
 from boom_model.plausible import VOLTAGE
-from planner.cli.completion import OneOf, joints, missions
+from planner.cli.completion import OneOf, OutFile, joints, missions
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from planner.files import Outputs
     from planner.missions.mission import Cycle, Mission
     from planner.motion.vehicle import VehicleCase
+    from planner.planning import Move
     from planner.reports.report import Report
     from planner.sizing.choice import Adapt, Choice
 
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 @payload_option
 @payload_as_option
 @vehicle_option
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of each distinct leg, for `boom view`.")
 @report_option
 @picture_option
 @boom_option
@@ -58,6 +60,7 @@ def mission(
     payload: float | None,
     payload_as: Any,
     vehicle: str | None,
+    out: str | None,
     picture: str | None,
     document: str | None,
     boom_file: str | None,
@@ -73,20 +76,22 @@ def mission(
       boom mission field-day --picture drives.png
       boom mission table-2-4 table-3-1 --joint inner --joint lower --report judged.pdf
     """
-    from planner.missions.mission import check_cycle, load_mission, plan_cycle
+    from planner.missions.mission import cycle_move, load_mission, plan_cycle
 
     boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
     check_picture(picture)
-    files = outputs(picture, document=document, inputs=(*missions, boom_file, vehicle))
-    if picture is not None and len(missions) > 1:
-        raise InputError(f"--picture {picture}: a page shows one mission, and {len(missions)} are given")
+    files = outputs(out, picture, document=document, inputs=(*missions, boom_file, vehicle))
+    for option, name in (("--picture", picture), ("--out", out)):
+        if name is not None and len(missions) > 1:
+            raise InputError(f"{option} {name}: it shows one mission, and {len(missions)} are given")
     loaded = [load_mission(name) for name in missions]
     cycles = {each.name: plan_cycle(boom, each, case, track=tracked(f"planning {each.name}")) for each in loaded}
     if len(cycles) < len(missions):
         raise InputError(f"two missions have the same name: {', '.join(each.name for each in loaded)}")
-    reports = {name: check_cycle(boom, cycle, payload_as=payload_as, vehicle=case) for name, cycle in cycles.items()}
-    written = with_names({"report": document, "picture": picture})
-    _write(files, _drive_pages(boom, cycles, reports, payload_as, case) if written else {}, reports, joints, written)
+    moves = {name: cycle_move(boom, cycle, payload_as=payload_as, vehicle=case) for name, cycle in cycles.items()}
+    reports = {name: move.report for name, move in moves.items()}
+    written = with_names({"recording": out, "report": document, "picture": picture})
+    _write(files, moves, cycles, joints, written)
     if len(reports) == 1 and not joints:
         ((name, report),) = reports.items()
         asked = f"mission {name}, {report.duration:.0f} s, payload {boom.payload.mass:g} kg"
@@ -94,34 +99,31 @@ def mission(
     return _print_compared(reports, joints, written, as_json, whole)
 
 
-def _drive_pages(
-    boom: Boom, cycles: Mapping[str, "Cycle"], reports: Mapping[str, "Report"], payload_as: Any, case: "VehicleCase"
-) -> dict[str, tuple[Any, ...]]:
-    """Return the arguments of `drive_pages` for each mission."""
-    from planner.planning import torques
-
-    return {
-        name: (boom, cycle.trajectory, torques(boom, cycle.trajectory, payload_as, case), reports[name], cycle.moves)
-        for name, cycle in cycles.items()
-    }
-
-
 def _write(
     files: "Outputs",
-    drawn: Mapping[str, tuple[Any, ...]],
-    reports: Mapping[str, "Report"],
+    moves: Mapping[str, "Move"],
+    cycles: Mapping[str, "Cycle"],
     joints: Sequence[str],
     written: Mapping[str, str],
 ) -> None:
-    """Write the report and the picture of missions, where they have a name."""
+    """Write the recording, the report and the picture of missions, where they have a name."""
     from planner.reports.document import write_document
     from planner.reports.drive_pictures import drive_pages, write_drive_picture
     from planner.reports.side_by_side import side_by_side_markdown
 
-    alone = len(reports) == 1 and not joints
+    reports = {name: move.report for name, move in moves.items()}
+    alone, first = len(moves) == 1 and not joints, next(iter(moves.values()))
     with files:
+        if "recording" in written:
+            from planner.recording import write_recording
+
+            write_recording(files.temporary(written["recording"]), first)
+        drawn = {
+            name: (move.boom, move.trajectory, move.loads.tau, move.report, cycles[name].moves)
+            for name, move in (moves.items() if "report" in written or "picture" in written else ())
+        }
         if "report" in written:
-            text = next(iter(reports.values())).to_markdown() if alone else side_by_side_markdown(reports, joints)
+            text = first.report.to_markdown() if alone else side_by_side_markdown(reports, joints)
             titled = {
                 title if alone else f"{name}: {title}": page
                 for name, shown in drawn.items()

@@ -349,7 +349,7 @@ def test_missions_stand_side_by_side(boom, tmp_path):
     code, out, _ = boom("mission", "table-2-4", "table-3-1", "--json")
     assert sorted(json.loads(out)["missions"]) == ["table 2-4", "table 3-1"]
     code, _, err = boom("mission", "table-2-4", "table-3-1", "--picture", "x.png")
-    assert (code, "a page shows one mission" in err) == (2, True)
+    assert (code, "it shows one mission" in err) == (2, True)
     code, _, err = boom("mission", "table-2-4", "table-2-4")
     assert (code, "two missions have the same name" in err) == (2, True)
     code, _, err = boom("mission", "table-2-4", "--joint", "elbow")

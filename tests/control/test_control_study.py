@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from boom_model import JOINTS, Boom, InputError
 from planner import plan
@@ -13,6 +12,7 @@ from planner.control import Controller, Figures, Goals, Outcome, Setup, Shaper, 
 from planner.control.study import _outcome, _overshoot, _residual
 from planner.recording import write_control_recording
 from tests.builders import main_move, with_running_torque
+from tests.recordings import recorded_entities, recorded_rows
 
 BOOM = Boom.load()
 
@@ -219,14 +219,10 @@ def test_bad_input_is_named(boom, tmp_path, options, message):
 def test_the_recording_holds_every_case(found, tmp_path):
     path = tmp_path / "c.rrd"
     write_control_recording(path, found)
-    reader = RrdReader(path)
-    entities = set(reader.store().schema().entity_paths())
+    entities = recorded_entities(path)
     for row in found.rows:
         name = f"/cases/{row.profile}/{row.controller}/{row.shaper}"
         assert {f"{name}/{kind}/{joint}" for kind in ("q", "error", "tau") for joint in JOINTS} <= entities
     assert {"/report", "/pictures/loops", "/pictures/errors", "/world/boom/tip"} <= entities
-    stream = reader.stream().filter(content="/tip_error/cubic/none", is_static=False, components="Scalars:scalars")
-    batches = [chunk.to_record_batch() for chunk in stream.to_chunks()]
-    batches.sort(key=lambda batch: batch.column("t")[0].value)
-    values = np.array([row for batch in batches for row in batch.column("Scalars:scalars").to_pylist()])
+    values = recorded_rows(path, "/tip_error/cubic/none", "Scalars:scalars")
     np.testing.assert_array_equal(values, 1e3 * found.tip_error[::5, :2])

@@ -11,7 +11,6 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from pyarrow import csv
-from rerun.chunk import RrdReader
 
 from boom_model import (
     JOINTS,
@@ -30,6 +29,7 @@ from planner.experiments.comparison import Log, Smoothed, compare, read_log, smo
 from planner.motion.trajectory import read_csv, write_csv
 from planner.recording import write_comparison_recording
 from tests.builders import main_move
+from tests.recordings import recorded_rows
 
 BOOM = Boom.load()
 SIGMA = np.array([1e-4, 1e-4, 1e-4, 5e-5, 2e-4])
@@ -263,10 +263,7 @@ def test_the_recording_holds_both(tmp_path: Path, planned: Trajectory):
     assert done.returncode == 0, done.stdout + done.stderr
 
     def rows(entity: str, component: str) -> Array:
-        stream = RrdReader(tmp_path / "both.rrd").stream().filter(content=entity, is_static=False, components=component)
-        batches = [chunk.to_record_batch() for chunk in stream.to_chunks()]
-        batches.sort(key=lambda batch: batch.column("t")[0].value)
-        return np.array([row for batch in batches for row in batch.column(component).to_pylist()])
+        return np.array(recorded_rows(tmp_path / "both.rrd", entity, component))
 
     for place, motion in (("boom", found.measured), ("planned", found.planned)):
         for name, T in body_transforms(BOOM, motion.q).items():

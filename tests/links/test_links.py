@@ -22,6 +22,7 @@ from planner.links.picture import write_link_picture
 from planner.links.report import to_json, to_markdown
 from planner.recording import write_link_recording
 from planner.validation.tables import table_3_1_motion
+from tests.recordings import recorded_entities
 
 BOOM = Boom.load()
 OPTIMISED = Body(
@@ -167,10 +168,7 @@ def test_picture_and_recording(new, tmp_path):
         [sys.executable, "-m", "rerun", "rrd", "verify", tmp_path / "r.rrd"], capture_output=True, check=False
     )
     assert verified.returncode == 0
-    from rerun.chunk import RrdReader
-
-    paths = {str(path) for path in RrdReader(tmp_path / "r.rrd").store().schema().entity_paths()}
-    assert {"/world/boom/inner/plates", "/plots/torque/inner", "/picture", "/report"} <= paths
+    assert {"/world/boom/inner/plates", "/plots/torque/inner", "/picture", "/report"} <= recorded_entities(tmp_path / "r.rrd")
 
 
 def test_the_command_as_json(boom, tmp_path):

@@ -31,6 +31,7 @@ from planner.recording.reach import boundary
 from planner.recording.torque_ratio import torque_ratios, worst_ratio
 from planner.reports.report import cells
 from tests.builders import without_drives
+from tests.recordings import recorded_entities, recorded_rows
 
 BOOM = Boom.load()
 FLOAT32 = 5e-7
@@ -44,11 +45,7 @@ class Read:
         self.path = path
 
     def rows(self, entity: str, component: str, static: bool = False) -> list[Any]:
-        stream = RrdReader(self.path).stream().filter(content=entity, is_static=static, components=component)
-        batches = [chunk.to_record_batch() for chunk in stream.to_chunks()]
-        if not static:
-            batches.sort(key=lambda batch: batch.column("t")[0].value)
-        return [row for batch in batches for row in batch.column(component).to_pylist()]
+        return recorded_rows(self.path, entity, component, static)
 
     def static(self, entity: str, component: str) -> Any:
         (row,) = self.rows(entity, component, static=True)
@@ -64,7 +61,7 @@ class Read:
         return feet, vectors
 
     def entities(self) -> set[str]:
-        return set(RrdReader(self.path).store().schema().entity_paths())
+        return recorded_entities(self.path)
 
     def titles(self) -> dict[str, str]:
         """The views' titles by their origins."""
@@ -306,7 +303,7 @@ def test_assumptions_are_a_page(panel: Read, move: Move):
 
 
 def test_every_view_says_its_unit(panel: Read):
-    texts = {"/checks", "/assumptions", "/report", "/drives"}
+    texts = {"/answer", "/states", "/events", "/checks", "/assumptions", "/report", "/drives"}
     for origin, title in panel.titles().items():
         assert origin in texts or re.search(r"\[(m|m/s|m/s\^2|deg|deg/s|deg/s\^2|N|Nm|mm|%|-)\]", title), (origin, title)
 
