@@ -38,7 +38,7 @@ def main() -> None:
 _QUESTIONS = """\
 Can the boom make a move, and are its drives strong enough?
   boom plan transport phenotyping
-Which motors and gearboxes are suitable for a day in the field?
+Which motors and gearboxes suit a day in the field?
   boom size field-day
 How light may a link be?
   boom link
