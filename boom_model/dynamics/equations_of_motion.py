@@ -1,6 +1,7 @@
 """The structure of the dynamics: M(q) qdd + C(q, qd) qd + g(q) = tau, and what follows from it.
 
-Every term is `inverse_dynamics` at a state that leaves only that term; there is no second model.
+Torques are `inverse_dynamics` at a state that leaves only that term. The mass matrix, and with it forward dynamics, comes
+from the same regrouped masses by `closed_form`.
 """
 
 import numpy as np
@@ -10,10 +11,12 @@ from boom_model.arrays import Array, broadcast, checked
 from boom_model.boom import Boom
 from boom_model.drives.drive import reflected_inertia
 from boom_model.dynamics.base_motion import BaseMotion
-from boom_model.dynamics.newton_euler import inverse_dynamics
+from boom_model.dynamics.closed_form import mass_and_bias, mass_forms
+from boom_model.dynamics.newton_euler import BASE_ENTRIES, inverse_dynamics, matched
 from boom_model.kinematics.forward import body_motion
 
-_ACCELERATIONS = np.eye(5)
+_CHUNK = 1280
+"""States at once, so that working memory does not grow with the batch."""
 
 
 def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Array:
@@ -22,11 +25,47 @@ def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Arr
     Raises:
         InputError: q is not finite or not (..., 5).
     """
-    q = checked("q", q, 5)[..., None, :]
-    M = inverse_dynamics(boom, q, np.zeros(5), _ACCELERATIONS, base=_falling(boom), reactions=False).tau
+    q = checked("q", q, 5)
+    states = q.reshape(-1, 5)
+    M = np.empty((len(states), 5, 5))
+    for start in range(0, len(states), _CHUNK):
+        M[start : start + _CHUNK] = mass_forms(boom, states[start : start + _CHUNK])
     if drive_inertia:
-        M = M + np.diag([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives])
-    return (M + np.swapaxes(M, -1, -2)) / 2.0  # symmetric to the last bit
+        M = M + _drive_inertia(boom)
+    M = (M + np.swapaxes(M, -1, -2)) / 2.0  # symmetric to the last bit
+    return M.reshape(*q.shape, 5)
+
+
+def mass_matrix_and_bias(
+    boom: Boom, q: ArrayLike, qd: ArrayLike, *, base: BaseMotion | None = None, tip_force: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """M(q) (..., 5, 5) and the torque (..., 5) that a motion without joint acceleration needs, C(q, qd) qd + g(q).
+
+    The same as `mass_matrix` and `inverse_dynamics` with qdd = 0, at a fraction of the time on small batches.
+
+    Args:
+        q, qd: (..., 5); they broadcast.
+        base, tip_force: as in `inverse_dynamics`.
+
+    Raises:
+        InputError: an input is not finite or of the wrong shape, or shapes do not match.
+    """
+    q, qd = broadcast(q=q, qd=qd)
+    shape = q.shape[:-1]
+    states = [x.reshape(-1, 5) for x in (q, qd)]
+    outside = None if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
+    push = None if tip_force is None else matched("tip_force", tip_force, shape)
+    count = len(states[0])
+    M, bias = np.empty((count, 5, 5)), np.empty((count, 5))
+    for start in range(0, count, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        M[part], bias[part] = mass_and_bias(
+            boom,
+            *(x[part] for x in states),
+            base=None if outside is None else [x[part] for x in outside],
+            tip_force=None if push is None else push[part],
+        )
+    return M.reshape(*q.shape, 5), bias.reshape(q.shape)
 
 
 def velocity_torque(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
@@ -67,8 +106,11 @@ def forward_dynamics(
         InputError: an input is not finite or of the wrong shape, or shapes do not match.
     """
     q, qd, tau = broadcast(q=q, qd=qd, tau=tau)
-    bias = inverse_dynamics(boom, q, qd, np.zeros(5), base=base, friction=friction, reactions=False).tau
-    M = mass_matrix(boom, q, drive_inertia=drive_inertia)
+    M, bias = mass_matrix_and_bias(boom, q, qd, base=base)
+    if friction:
+        bias = bias + boom.friction.torque(qd)
+    if drive_inertia:
+        M = M + _drive_inertia(boom)
     return np.asarray(np.linalg.solve(M, (tau - bias)[..., None])[..., 0])
 
 
@@ -95,6 +137,10 @@ def potential_energy(boom: Boom, q: ArrayLike) -> Array:
     masses = {**boom.bodies, "payload": boom.payload}
     heights = {name: motion.com[..., 2] for name, motion in body_motion(boom, q, zero, zero).items()}
     return boom.gravity * np.asarray(sum(masses[name].mass * z for name, z in heights.items()))
+
+
+def _drive_inertia(boom: Boom) -> Array:
+    return np.diag([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives])
 
 
 def _falling(boom: Boom) -> BaseMotion:

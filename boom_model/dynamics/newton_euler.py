@@ -38,7 +38,7 @@ _CHUNK = 1280
 a second one gains nothing on so thin a matrix, and waits for its turn on a busy machine."""
 
 _O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
-_BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
+BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
 _LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
 
 
@@ -110,16 +110,16 @@ def inverse_dynamics(
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]
-    outside = [] if base is None else [_vectors(f"base {name}", getattr(base, name), shape) for name in _BASE_ENTRIES]
-    push = None if tip_force is None else _vectors("tip_force", tip_force, shape)
-    twist = None if tip_moment is None else _vectors("tip_moment", tip_moment, shape)
+    outside = [] if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
+    push = None if tip_force is None else matched("tip_force", tip_force, shape)
+    twist = None if tip_moment is None else matched("tip_moment", tip_moment, shape)
     count = len(motion[0])
     out = _Outputs(
         np.empty((count, 5)),
         np.zeros((3, count, 3)) if reactions else None,
         np.empty((count, 6)) if reactions else None,
     )
-    model = _model(boom, payload_as)
+    model = regrouped(boom, payload_as)
     rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) if drive_inertia else None
     for start in range(0, count, _CHUNK):
         part = slice(start, start + _CHUNK)
@@ -152,12 +152,14 @@ def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
     return np.stack([-(c * x + s * z), s * x - c * z, np.zeros_like(x)], axis=-1)
 
 
-class _Model(NamedTuple):
+class Regrouped(NamedTuple):
     """The boom's masses, regrouped."""
 
     boom: Boom
     rows: Array
     """(17, 11): Q of all bodies; then Q of the outer link (o, e2, p2) and of all beyond pins 7 and 8 (o, e3, p3)."""
+    torque_rows: Array
+    """(11, 11): Q of all bodies alone."""
     tip: Array
     """(11,) g of the tip."""
     payload: Array
@@ -167,7 +169,7 @@ class _Model(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _model(boom: Boom, payload_as: PayloadAs) -> _Model:
+def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
     elements = _elements(boom)
     bodies = {**boom.bodies, "payload": boom.payload}
     Q = {name: elements[name].T @ _pseudo_inertia(body, R_LINK_BODY[name]) @ elements[name] for name, body in bodies.items()}
@@ -176,9 +178,10 @@ def _model(boom: Boom, payload_as: PayloadAs) -> _Model:
     top = sum((Q[name] for name in ("upper", "extension", "end_effector", "payload")), np.zeros((11, 11)))
     rows = [sum(Q.values(), np.zeros((11, 11))), Q["outer"][[_O, _E2, _P2]], top[[_O, _E3, _P3]]]
     com = R_LINK_BODY["payload"] @ boom.payload.com
-    return _Model(
+    return Regrouped(
         boom=boom,
         rows=read_only(np.concatenate(rows)),
+        torque_rows=read_only(rows[0]),
         tip=elements["payload"][0],
         payload=elements["payload"].T @ [1.0, *com],
         hanging=boom.payload.mass if payload_as == "force" else 0.0,
@@ -217,6 +220,9 @@ def _pseudo_inertia(body: Body, R: Array) -> Array:
 
 _Value = Array | float
 """(n,) of a chunk, or the number of a single state: Python's own arithmetic is ten times quicker on it than NumPy's."""
+
+_Rows = Array | list[list[float]]
+"""Values of vectors along x, z and n: an array (3, k, n), or three lists of k numbers of a single state."""
 
 
 class _State(NamedTuple):
@@ -270,7 +276,8 @@ class _Outputs(NamedTuple):
         )
 
 
-def _vectors(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Vectors (n, 3), checked, of states of a shape that has n of them."""
     values = checked(name, values, 3)
     try:
         return np.reshape(np.broadcast_to(values, (*shape, 3)), (-1, 3))
@@ -298,19 +305,20 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1))
 
 
-def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> Array:
-    """A, the acceleration of each vector b: (3, 11, n) along x, z and n, or (3, 11) of a single state.
+def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> _Rows:
+    """A, the acceleration of each vector b along x, z and n: an array (3, 11, n), or three lists of a single state.
 
     C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
     """
-    A = np.empty((3, 11, *np.shape(rho)))
+    A: _Rows = [[0.0] * 11, [0.0] * 11, [0.0] * 11] if isinstance(rho, float) else np.empty((3, 11, *rho.shape))
+    Ax, Az, An = A
     w1, w2, w3 = plane.W
     d1, d2, d3 = plane.W1
     w11, w22, w33, w12, w13, w23 = w1 * w1, w2 * w2, w3 * w3, w1 * w2, w1 * w3, w2 * w3
-    A[0, _O], A[1, _O], A[2, _O] = plane.a
-    A[0, _X], A[1, _X], A[2, _X] = -(w22 + w33), w12 + d3, w13 - d2
-    A[0, _Z], A[1, _Z], A[2, _Z] = w12 - d3, -(w11 + w33), w23 + d1
-    A[0, _N], A[1, _N], A[2, _N] = w13 + d2, w23 - d1, -(w11 + w22)
+    Ax[_O], Az[_O], An[_O] = plane.a
+    Ax[_X], Az[_X], An[_X] = -(w22 + w33), w12 + d3, w13 - d2
+    Ax[_Z], Az[_Z], An[_Z] = w12 - d3, -(w11 + w33), w23 + d1
+    Ax[_N], Az[_N], An[_N] = w13 + d2, w23 - d1, -(w11 + w22)
     qd, qdd = state.qd, state.qdd
     rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
     for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
@@ -319,29 +327,28 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
         along_x, along_z = square + w22, square + w11
         less, more = accel + d3 - w12, accel + d3 + w12
         k, m = double * w1 + w13 - d2, double * w2 + w23 + d1
-        A[0, e] = -along_x * c - less * s
-        A[1, e] = more * c - along_z * s
-        A[2, e] = k * c + m * s
-        A[0, p] = along_x * s - less * c
-        A[1, p] = -more * s - along_z * c
-        A[2, p] = m * c - k * s
+        Ax[e] = -along_x * c - less * s
+        Az[e] = more * c - along_z * s
+        An[e] = k * c + m * s
+        Ax[p] = along_x * s - less * c
+        Az[p] = -more * s - along_z * c
+        An[p] = m * c - k * s
     c, s, slide = C[1], S[1], 2.0 * qd[3]
     turning = slide * (qd[2] + w3)
-    A[:, _RHO] = rho * A[:, _E3]
-    A[0, _RHO] += qdd[3] * c - turning * s
-    A[1, _RHO] += qdd[3] * s + turning * c
-    A[2, _RHO] += slide * (w1 * s - w2 * c)
+    Ax[_RHO] = rho * Ax[_E3] + (qdd[3] * c - turning * s)
+    Az[_RHO] = rho * Az[_E3] + (qdd[3] * s + turning * c)
+    An[_RHO] = rho * An[_E3] + slide * (w1 * s - w2 * c)
     return A
 
 
-def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied, out: _Outputs) -> None:
+def _newton_euler(model: Regrouped, state: _State, plane: _Plane, applied: _Applied, out: _Outputs) -> None:
     """Fills the outputs of a chunk."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
-    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[1], q[2], q[2] + q[4]))
+    (c2, s2), (c3, s3), (ct, st) = _cosine_and_sine(q[1]), _cosine_and_sine(q[2]), _cosine_and_sine(q[2] + q[4])
     A = _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), rho)
-    rows = model.rows if out.pins is not None else model.rows[:11]
-    U = rows @ A if A.ndim == 3 else A @ rows.T
+    rows = model.rows if out.pins is not None else model.torque_rows
+    U = np.array(A) @ rows.T if isinstance(A, list) else rows @ A
     if model.hanging:
         _put_on(
             U, model.payload, (-model.hanging * plane.lift[0], -model.hanging * plane.lift[1], -model.hanging * plane.lift[2])
@@ -349,45 +356,47 @@ def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied
     if applied.force is not None:
         _put_on(U, model.tip, applied.force)
     moment = (0.0, 0.0, 0.0) if applied.moment is None else applied.moment
+    Ux, Uz, Un = U.tolist() if isinstance(A, list) else U
 
-    def about(c: _Value, s: _Value, e: Array, p: Array) -> _Value:
+    def about(c: _Value, s: _Value, e: int, p: int) -> _Value:
         """(b_e x U_e + b_p x U_p) . n"""
-        turned: _Value = c * (e[1] - p[0]) - s * (e[0] + p[1])
+        turned: _Value = c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
         return turned
 
-    on_tool = about(ct, st, U[:, _ET], U[:, _PT]) - moment[2]
-    beyond_actuator = rho * (c3 * U[1, _RHO] - s3 * U[0, _RHO]) + on_tool
-    # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
-    reach = ((c2, _E2, -s2, _P2), (c3, _E3, -s3, _P3), (rho * c3, _RHO, 0.0, _O), (ct, _ET, -st, _PT))
-    out.tau[:, 0] = U[0, _N] - U[2, _X] - sum(a * U[2, i] + b * U[2, j] for a, i, b, j in reach) - moment[1]
-    out.tau[:, 1] = about(c2, s2, U[:, _E2], U[:, _P2])
-    out.tau[:, 2] = about(c3, s3, U[:, _E3], U[:, _P3]) + beyond_actuator
-    out.tau[:, 3] = c3 * U[0, _RHO] + s3 * U[1, _RHO]
-    out.tau[:, 4] = on_tool
+    on_tool = about(ct, st, _ET, _PT) - moment[2]
+    beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
+    # of the vectors b along x and z, less those of the base itself, for moments that need all of the boom
+    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
+    tau = out.tau
+    tau[:, 0] = Ux[_N] - Un[_X] - reach - moment[1]
+    tau[:, 1] = about(c2, s2, _E2, _P2)
+    tau[:, 2] = about(c3, s3, _E3, _P3) + beyond_actuator
+    tau[:, 3] = c3 * Ux[_RHO] + s3 * Uz[_RHO]
+    tau[:, 4] = on_tool
     if out.pins is None or out.mount is None:
         return
 
     # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from pin 6: the moments about
     # pins 8 and 6 give the force at pin 7 across both directions, and the balance of forces the other two.
-    F_outer, F_top = U[:, 11], U[:, 14]
-    M_outer = about(c2, s2, U[:, 12], U[:, 13])
-    M_top = about(c3, s3, U[:, 15], U[:, 16]) + beyond_actuator
+    M_outer = about(c2, s2, 12, 13)
+    M_top = about(c3, s3, 15, 16) + beyond_actuator
     sine = s3 * c2 - c3 * s2
     with np.errstate(divide="ignore", invalid="ignore"):
-        along_inner, along_lower = -M_top / (g.L5 * sine), -M_outer / (g.L4 * sine)
-        f7 = np.stack([along_inner * c2 + along_lower * c3, along_inner * s2 + along_lower * s3])
-    for pin, force in enumerate((F_outer[:2] + f7, f7, F_top[:2] - f7)):
-        out.pins[pin, :, 0], out.pins[pin, :, 2] = force
+        along_inner, along_lower = np.divide(-M_top, g.L5 * sine), np.divide(-M_outer, g.L4 * sine)
+        f7x, f7z = along_inner * c2 + along_lower * c3, along_inner * s2 + along_lower * s3
+    for pin, x, z in ((0, Ux[11] + f7x, Uz[11] + f7z), (1, f7x, f7z), (2, Ux[14] - f7x, Uz[14] - f7z)):
+        out.pins[pin, :, 0], out.pins[pin, :, 2] = x, z
 
-    rise = ((s2, _E2, c2, _P2), (s3, _E3, c3, _P3), (rho * s3, _RHO, 0.0, _O), (st, _ET, ct, _PT))
-    Mx = U[2, _Z] - U[1, _N] + sum(a * U[2, i] + b * U[2, j] for a, i, b, j in rise) - moment[0]
-    Mn = U[1, _X] - U[0, _Z] + out.tau[:, 1] + out.tau[:, 2]
+    rise = (s2 * Un[_E2] + c2 * Un[_P2]) + (s3 * Un[_E3] + c3 * Un[_P3]) + rho * s3 * Un[_RHO] + (st * Un[_ET] + ct * Un[_PT])
+    Mx = Un[_Z] - Uz[_N] + rise - moment[0]
+    Mn = Uz[_X] - Ux[_Z] + tau[:, 1] + tau[:, 2]
     c1, s1 = _cosine_and_sine(q[0])
-    for row, (along, normal) in ((0, (U[0, _O], U[2, _O])), (3, (Mx, Mn))):
-        out.mount[:, row] = -(c1 * along + s1 * normal)
-        out.mount[:, row + 1] = -(s1 * along - c1 * normal)
-    out.mount[:, 2] = -U[1, _O]
-    out.mount[:, 5] = -out.tau[:, 0]
+    mount = out.mount
+    for row, along, normal in ((0, Ux[_O], Un[_O]), (3, Mx, Mn)):
+        mount[:, row] = -(c1 * along + s1 * normal)
+        mount[:, row + 1] = -(s1 * along - c1 * normal)
+    mount[:, 2] = -Uz[_O]
+    mount[:, 5] = -tau[:, 0]
 
 
 def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:

@@ -27,14 +27,12 @@ from boom_model import (
     InfeasibleError,
     InputError,
     gravity_torque,
-    inverse_dynamics,
     mass_matrix,
 )
 from boom_model.arrays import Array, read_only
 from boom_model.drives.drive import available_torque, reflected_inertia
+from boom_model.dynamics.equations_of_motion import mass_matrix_and_bias
 from planner.control.figures import Figures
-
-_UNITS = np.concatenate([np.zeros((1, 5)), np.eye(5)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,12 +282,7 @@ def accelerations(
     if boom.friction.viscous.any() or boom.friction.coulomb.any():
         direction = np.tanh(qd / np.radians(plant.figures.stick_deg_s))
         tau -= boom.friction.viscous * qd + boom.friction.coulomb * direction
-    # One call for the bias and the five columns of M: a call costs far more than its states do.
-    force = None if tip_force is None else np.broadcast_to(tip_force, (len(q), 3))[:, None]
-    terms = inverse_dynamics(
-        boom, q[:, None], qd[:, None], np.broadcast_to(_UNITS, (len(q), 6, 5)), base=base, tip_force=force, reactions=False
-    ).tau
-    bias, M = terms[:, 0], terms[:, 1:] - terms[:, :1]
+    M, bias = mass_matrix_and_bias(boom, q, qd, base=base, tip_force=tip_force)
     rigid = plant.rotor.copy()
     rigid[E] = 0.0
     qdd = np.linalg.solve(M + np.diag(rigid), (tau - bias)[..., None])[..., 0]
