@@ -27,6 +27,9 @@ _COSINES, _SINES, _RHO_3, _AT_3 = slice(1, 4), slice(4, 7), slice(7, 9), slice(2
 _ANGLES = read_only([[0, 0, 0], [1, 0, 0], [0, 1, 1], [0, 0, 0], [0, 0, 1]])
 """q @ _ANGLES: theta2, theta3, theta3 + theta5."""
 
+_PRODUCTS = np.triu_indices(9)
+"""Pairs of features."""
+
 _PAIRS = np.triu_indices(7)
 """Pairs of rates: of the plane about z, theta2' to theta5', of the plane about x and about n."""
 
@@ -36,7 +39,7 @@ _FIRST_PAIR = 10
 
 
 class Forms(NamedTuple):
-    """Constant quadratic forms in f, (81, 5 k): k coefficients of the torque of each joint; payload as mass."""
+    """Constant quadratic forms in f, (45, 5 k): k coefficients of the torque of each joint; payload as mass."""
 
     inertia: Array
     """k = 5: joint accelerations, the mass matrix."""
@@ -68,7 +71,7 @@ def mass_and_bias(
         G = _evaluate(forms.level, f)
         causes = np.empty((count, 16))
         causes[:, 0] = boom.gravity
-        np.multiply(qd[:, _JOINT_PAIRS[0]], qd[:, _JOINT_PAIRS[1]], out=causes[:, 1:])
+        np.multiply(qd.take(_JOINT_PAIRS[0], axis=1), qd.take(_JOINT_PAIRS[1], axis=1), out=causes[:, 1:])
         bias = _times(G[:, :, 5:], causes)
     else:
         G = _evaluate(forms.moving, f)
@@ -98,10 +101,11 @@ def _features(boom: Boom, q: Array) -> Array:
 
 def _evaluate(forms: Array, f: Array) -> Array:
     """Quadratic forms at features (n, 9): (n, 5, k)."""
-    products = (f[:, :, None] * f[:, None, :]).reshape(-1, 81)
-    if len(f) == 1:  # BLAS rounds a vector's product otherwise than a matrix's: a state's result must not depend on its batch
-        return (np.concatenate([products, products]) @ forms)[:1].reshape(1, 5, -1)
-    return (products @ forms).reshape(len(f), 5, -1)
+    count, coefficients = len(f), forms.shape[1] // 5
+    products = f.take(_PRODUCTS[0], axis=1) * f.take(_PRODUCTS[1], axis=1)
+    if count == 1:  # BLAS rounds a vector's product otherwise than a matrix's: a state's result must not depend on its batch
+        return (np.concatenate([products, products]) @ forms)[:1].reshape(1, 5, coefficients)
+    return (products @ forms).reshape(count, 5, coefficients)
 
 
 def _times(G: Array, causes: Array) -> Array:
@@ -126,11 +130,13 @@ def _forms(boom: Boom) -> Forms:
     carried[:, 0, :, 0] = np.eye(3)  # the base's acceleration is that of o alone
     causes = [*partial[:5], *carried, *partial[5:], *pairs]
     moving = np.einsum("ipca,ab,kqcb->pqik", partial[:5], model.torque_rows, causes, optimize=True)
+    moving = moving + np.where(np.eye(9)[:, :, None, None], 0.0, np.swapaxes(moving, 0, 1))
+    moving = moving[_PRODUCTS]
     joints = [_FIRST_PAIR + k for k, pair in enumerate(zip(*_PAIRS, strict=True)) if max(pair) < 5]
     return Forms(
-        inertia=read_only(moving[..., :5].reshape(81, -1)),
-        level=read_only(moving[..., [0, 1, 2, 3, 4, 6, *joints]].reshape(81, -1)),
-        moving=read_only(moving.reshape(81, -1)),
+        inertia=read_only(moving[..., :5].reshape(45, -1)),
+        level=read_only(moving[..., [0, 1, 2, 3, 4, 6, *joints]].reshape(45, -1)),
+        moving=read_only(moving.reshape(45, -1)),
         tip=read_only(np.einsum("ipca,a->pic", partial[:5], model.tip).reshape(9, -1)),
     )
 

@@ -55,16 +55,17 @@ def mass_matrix_and_bias(
     states = [x.reshape(-1, 5) for x in (q, qd)]
     outside = None if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
     push = None if tip_force is None else matched("tip_force", tip_force, shape)
+
+    def of(part: slice) -> tuple[Array, Array]:
+        given = None if outside is None else [x[part] for x in outside]
+        return mass_and_bias(boom, *(x[part] for x in states), base=given, tip_force=None if push is None else push[part])
+
     count = len(states[0])
-    M, bias = np.empty((count, 5, 5)), np.empty((count, 5))
-    for start in range(0, count, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        M[part], bias[part] = mass_and_bias(
-            boom,
-            *(x[part] for x in states),
-            base=None if outside is None else [x[part] for x in outside],
-            tip_force=None if push is None else push[part],
-        )
+    if count <= _CHUNK:
+        M, bias = of(slice(None))
+    else:
+        parts = [of(slice(start, start + _CHUNK)) for start in range(0, count, _CHUNK)]
+        M, bias = (np.concatenate(each) for each in zip(*parts, strict=True))
     return M.reshape(*q.shape, 5), bias.reshape(q.shape)
 
 

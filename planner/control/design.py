@@ -1,4 +1,4 @@
-"""Controllers designed from stated goals, and what their loops are worth; the only importer of python-control.
+"""Controllers designed from stated goals, and what their loops are worth.
 
 Every controller reads positions p (5,) at its sampling period T, the motors' at elastic joints, and holds its torque between
 samples:
@@ -13,9 +13,11 @@ computed-torque    u = (M + J)(qdd_r + w) + h(p, v) + friction(qd_r)
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.linalg import expm, solve_continuous_are
 
 from boom_model import InputError, gravity_torque, mass_matrix
 from boom_model.arrays import Array, read_only, scalar
@@ -140,16 +142,14 @@ def design(plant: Plant, controller: Controller, goals: Goals, q: Array) -> Gain
 
 
 def _lqr(plant: Plant, goals: Goals, q: Array, M: Array) -> tuple[Array, Array, Array]:
-    import control
-
     w, zeta, a = 2.0 * np.pi * goals.bandwidth_Hz, goals.damping, goals.integral
     weights = (1.0 + a**2 * (4.0 * zeta**2 - 2.0)) * w**4, (a**2 + 4.0 * zeta**2 - 2.0) * w**2, a**2 * w**6
     if min(weights) < 0.0:
         raise InputError(f"damping is {zeta:g}; lqr needs at least {np.sqrt(max(0.5 - a**2 / 4.0, 0.0)):.3g} for its weights")
     rigid = linearise(Plant.of(plant.boom, plant.figures, elastic=False), q)
-    system = control.ss(rigid.A, rigid.B @ M, np.eye(10), 0.0)  # from accelerations M^-1 u: their weight is 1
-    k, _, _ = control.lqr(system, np.diag(np.repeat(weights, 5)), np.eye(5), integral_action=rigid.measured)
-    K = M @ k
+    A = np.block([[rigid.A, np.zeros((10, 5))], [rigid.measured, np.zeros((5, 5))]])  # the integrals of the positions last
+    B = np.vstack([rigid.B @ M, np.zeros((5, 5))])  # from accelerations M^-1 u: their weight is 1
+    K = M @ B.T @ solve_continuous_are(A, B, np.diag(np.repeat(weights, 5)), np.eye(5))
     return K[:, :5], K[:, 5:10], K[:, 10:]
 
 
@@ -171,15 +171,13 @@ def analyse(plant: Plant, gains: Gains, q: Array, *, model: Plant | None = None,
     Raises:
         InputError: a stepper, which has no loop.
     """
-    import control
-
     if gains.controller is Controller.STEPPER:
         raise InputError("a stepper runs open loop: it has no poles to place and no margins")
     T = plant.figures.sampling_period
     linear = linearise(plant, q)
     sampled = _sampled(linear, T)
     law = _law(plant if model is None else model, gains, q, T)
-    poles = np.asarray(control.feedback(sampled, law).poles())
+    poles = _poles(sampled, law)
     with np.errstate(divide="ignore"):
         continuous = np.log(poles[np.abs(poles) > 1e-6].astype(complex)) / T
     largest = float(np.abs(poles).max())
@@ -187,23 +185,31 @@ def analyse(plant: Plant, gains: Gains, q: Array, *, model: Plant | None = None,
     if not responses:
         return Loop(q, continuous[order], largest, (), np.zeros(0), np.zeros((0, 5)))
     f = np.geomspace(0.02, 0.4999 / T, 2000)
-    P, C = (np.moveaxis(_response(s, f), -1, 0) for s in (sampled, law))
-    L = C @ P
+    z = np.exp(2j * np.pi * f * T)
+    L = _response(law, z) @ _response(sampled, z)
     each = np.stack([_alone(L, i) for i in range(5)], axis=-1)
     margins = tuple(_margins(i, f, each[:, i]) for i in range(5))
     return Loop(q, continuous[order], largest, margins, f, each)
 
 
-def _sampled(linear: Linear, T: float) -> Any:
-    import control
+class _Sampled(NamedTuple):
+    """x_k+1 = A x_k + B u_k, y_k = C x_k + D u_k."""
 
-    return control.sample_system(control.ss(linear.A, linear.B, linear.measured, 0.0), T, method="zoh")
+    A: Array
+    B: Array
+    C: Array
+    D: Array
 
 
-def _law(plant: Plant, gains: Gains, q: Array, T: float) -> Any:
+def _sampled(linear: Linear, T: float) -> _Sampled:
+    """The linear plant behind a zero-order hold: exp([[A, B], [0, 0]] T) holds both its matrices."""
+    n, inputs = linear.B.shape
+    held = expm(T * np.block([[linear.A, linear.B], [np.zeros((inputs, n + inputs))]]))
+    return _Sampled(held[:n, :n], held[:n, n:], linear.measured, np.zeros((len(linear.measured), inputs)))
+
+
+def _law(plant: Plant, gains: Gains, q: Array, T: float) -> _Sampled:
     """The controller as a system from p to -u, its states (p_k-1, v_k-1, sum)."""
-    import control
-
     Kp, Kd, Ki = feedback_of(plant, gains, q)
     a = np.exp(-2.0 * np.pi * plant.figures.velocity_filter_Hz * T)
     eye, zero = np.eye(5), np.zeros((5, 5))
@@ -212,11 +218,19 @@ def _law(plant: Plant, gains: Gains, q: Array, T: float) -> Any:
     B = np.vstack([eye, slope * eye, T * eye])
     C, D = np.hstack([-slope * Kd, a * Kd, Ki]), Kp + slope * Kd
     kept = slice(None) if Ki.any() else slice(0, 10)
-    return control.ss(A[kept, kept], B[kept], C[:, kept], D, T)
+    return _Sampled(A[kept, kept], B[kept], C[:, kept], D)
 
 
-def _response(system: Any, f: Array) -> Any:
-    return system(np.exp(2j * np.pi * f * system.dt), squeeze=False)
+def _poles(plant: _Sampled, law: _Sampled) -> Any:
+    """Of the plant, which passes nothing straight through, with the law fed back: complex (k,)."""
+    A = plant.A - plant.B @ law.D @ plant.C
+    return np.linalg.eigvals(np.block([[A, -plant.B @ law.C], [law.B @ plant.C, law.A]]))
+
+
+def _response(system: _Sampled, z: Any) -> Any:
+    """C (z - A)^-1 B + D at z (k,): (k, outputs, inputs)."""
+    states = np.linalg.solve(z[:, None, None] * np.eye(len(system.A)) - system.A, system.B.astype(complex))
+    return system.C @ states + system.D
 
 
 def _alone(L: Any, i: int) -> Any:
@@ -227,17 +241,20 @@ def _alone(L: Any, i: int) -> Any:
 
 
 def _margins(joint: int, f: Array, L: Any) -> Margins:
-    import control
-
-    gains, phases, _, _, crossings, _ = control.stability_margins(control.FRD(L, 2.0 * np.pi * f, smooth=True), returnall=True)
-    decibels = 20.0 * np.log10(np.asarray(gains, dtype=float))
+    """From the roots of cubic splines through the response: |L| = 1, and L real and negative."""
+    real, imaginary = (CubicSpline(f, part, extrapolate=False) for part in (L.real, L.imag))
+    turns = imaginary.roots()
+    crossings = CubicSpline(f, np.abs(L) ** 2 - 1.0, extrapolate=False).roots()
+    turned = real(turns)
+    decibels = -20.0 * np.log10(-turned[turned < 0.0])
     more, less = decibels[decibels > 0.0], decibels[decibels < 0.0]
-    at = int(np.abs(phases).argmin()) if len(phases) else None
+    phases = np.degrees(np.arctan2(-imaginary(crossings), -real(crossings)))  # beyond -180 deg
+    at = int(np.abs(phases).argmin()) if phases.size else None
     return Margins(
         joint=joint,
         gain_dB=float(more.min()) if more.size else None,
         less_gain_dB=float(less.max()) if less.size else None,
         phase_deg=None if at is None else float(phases[at]),
-        crossover_Hz=None if at is None else float(crossings[at] / (2.0 * np.pi)),
+        crossover_Hz=None if at is None else float(crossings[at]),
         sensitivity_peak=float((1.0 / np.abs(1.0 + L)).max()),
     )

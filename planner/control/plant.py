@@ -16,6 +16,7 @@ Bending out of the arm's plane, torsion of the links and the play of their pins 
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -109,6 +110,40 @@ class Plant:
         """The same drives, figures and damping on another boom: another payload, for example."""
         return replace(self, boom=boom)
 
+    @cached_property
+    def columns(self) -> slice | list[int]:
+        """The elastic joints' columns of an array: a slice where they are neighbours, which NumPy takes ten times quicker."""
+        first, count = self.elastic[0] if self.elastic else 0, len(self.elastic)
+        neighbours = self.elastic == tuple(range(first, first + count))
+        return slice(first, first + count) if neighbours else list(self.elastic)
+
+    @cached_property
+    def elastic_rotor(self) -> Array:
+        """(m,) N^2 (J_rotor + J_gear) of the elastic joints [kg m^2]."""
+        return read_only(self.rotor[list(self.elastic)])
+
+    @cached_property
+    def softness(self) -> Array:
+        """(3, m) 1 / K1, 1 / K2, 1 / K3 of the gearboxes [rad/Nm]."""
+        return read_only(1.0 / self.stiffness.T)
+
+    @cached_property
+    def spans(self) -> Array:
+        """(2, m) T1 and T2 - T1: torque over the first and the second segment of a gearbox [Nm]."""
+        return read_only([self.breaks[:, 0], self.breaks[:, 1] - self.breaks[:, 0]])
+
+    @cached_property
+    def rigid_inertia(self) -> Array:
+        """(5, 5) inertia of the drives that turn with their links: those of joints without elasticity."""
+        stiff = self.rotor.copy()
+        stiff[list(self.elastic)] = 0.0
+        return read_only(np.diag(stiff))
+
+    @cached_property
+    def joints_rub(self) -> bool:
+        """Whether the boom's joints have friction of their own."""
+        return bool(self.boom.friction.viscous.any() or self.boom.friction.coulomb.any())
+
     @property
     def limits(self) -> tuple[str, ...]:
         """What is not known of this plant, a sentence each."""
@@ -140,25 +175,32 @@ def compliance(plant: Plant, q: Array) -> tuple[Array, Array]:
             if joint == 1:
                 C[..., column] = plant.boom.geometry.L9 / (3.0 * plant.figures.inner_bending)
             elif joint == 2:
-                free, rho = plant.figures.extension_clear_mm * 1e-3 + q[..., 3], plant.boom.geometry.L7 + q[..., 3]
-                free = np.maximum(free, 0.0)
-                C[..., column] = free**3 / (3.0 * plant.figures.extension_bending * rho**2)
-                C_4[..., column] = C[..., column] * (3.0 / np.maximum(free, 1e-9) - 2.0 / rho)
+                free = np.maximum(plant.figures.extension_clear_mm * 1e-3 + q[..., 3], 0.0)
+                share = free / (plant.boom.geometry.L7 + q[..., 3])
+                bent = share * share / (3.0 * plant.figures.extension_bending)
+                C[..., column] = bent * free
+                C_4[..., column] = bent * (3.0 - 2.0 * share)
     return C, C_4
 
 
 def _segments(plant: Plant, C: Array) -> tuple[tuple[Array, Array, Array], Array, Array]:
     """Stiffness of each segment in series with compliance C (..., m), and the twists at which they end."""
-    first, second, third = (1.0 / (1.0 / plant.stiffness[:, i] + C) for i in range(3))
+    first, second, third = (1.0 / (softness + C) for softness in plant.softness)
     end_1 = plant.breaks[:, 0] / first
     return (first, second, third), end_1, end_1 + (plant.breaks[:, 1] - plant.breaks[:, 0]) / second
 
 
 def spring_torque(plant: Plant, q: Array, twist: Array, C: Array | None = None) -> Array:
     """T_s (..., m) [Nm] at a twist theta - q (..., m) [rad]."""
-    (k1, k2, k3), end_1, end_2 = _segments(plant, compliance(plant, q)[0] if C is None else C)
-    x = np.maximum(np.abs(twist) - 0.5 * plant.gap, 0.0)
-    size = k1 * np.minimum(x, end_1) + k2 * np.clip(x - end_1, 0.0, end_2 - end_1) + k3 * np.maximum(x - end_2, 0.0)
+    C = compliance(plant, q)[0] if C is None else C
+    soft_1, soft_2, soft_3 = (softness + C for softness in plant.softness)
+    span_1, span_2 = plant.spans
+    on_1 = np.maximum(np.abs(twist) - 0.5 * plant.gap, 0.0)
+    on_2 = on_1 - span_1 * soft_1
+    on_3 = on_2 - span_2 * soft_2
+    size = np.minimum(on_1 / soft_1, span_1)
+    size += np.minimum(np.maximum(on_2, 0.0) / soft_2, span_2)
+    size += np.maximum(on_3, 0.0) / soft_3
     torque: Array = np.copysign(size, twist)
     return torque
 
@@ -269,23 +311,21 @@ def accelerations(
     Raises:
         InputError: a state is not finite.
     """
-    boom, E = plant.boom, list(plant.elastic)
+    boom, E = plant.boom, plant.columns
     tau: Array = u.copy()
     thetadd = np.zeros_like(theta)
-    if E:
+    if plant.elastic:
         C, C_4 = compliance(plant, q)
         load = spring_torque(plant, q, theta - q[:, E], C)
         passed = load + plant.damping * (theta_d - qd[:, E])
         tau[:, E] = passed
-        tau[:, 3] += 0.5 * (load**2 * C_4).sum(axis=-1)  # a bent extension pushes itself out: so the energy is kept
-        thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.rotor[E]
-    if boom.friction.viscous.any() or boom.friction.coulomb.any():
+        tau[:, 3] += 0.5 * np.einsum("bm,bm,bm->b", load, load, C_4)  # a bent extension pushes itself out: so the energy is kept
+        thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.elastic_rotor
+    if plant.joints_rub:
         direction = np.tanh(qd / np.radians(plant.figures.stick_deg_s))
         tau -= boom.friction.viscous * qd + boom.friction.coulomb * direction
     M, bias = mass_matrix_and_bias(boom, q, qd, base=base, tip_force=tip_force)
-    rigid = plant.rotor.copy()
-    rigid[E] = 0.0
-    qdd = np.linalg.solve(M + np.diag(rigid), (tau - bias)[..., None])[..., 0]
+    qdd = np.linalg.solve(M + plant.rigid_inertia, (tau - bias)[..., None])[..., 0]
     return np.asarray(qdd), thetadd
 
 
