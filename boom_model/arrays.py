@@ -61,7 +61,7 @@ def broadcast(**named: ArrayLike) -> tuple[Array, ...]:
         InputError: as `checked`, or shapes that do not broadcast.
     """
     arrays = [checked(name, values, 5) for name, values in named.items()]
-    if all(array.shape == arrays[0].shape for array in arrays):
+    if len({array.shape for array in arrays}) == 1:
         return tuple(arrays)
     try:
         return tuple(np.broadcast_arrays(*arrays))

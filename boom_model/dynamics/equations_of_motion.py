@@ -58,7 +58,7 @@ def mass_matrix_and_bias(
 
     def of(part: slice) -> tuple[Array, Array]:
         given = None if outside is None else [x[part] for x in outside]
-        return mass_and_bias(boom, *(x[part] for x in states), base=given, tip_force=None if push is None else push[part])
+        return mass_and_bias(boom, states[0][part], states[1][part], given, None if push is None else push[part])
 
     count = len(states[0])
     if count <= _CHUNK:

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import tan
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -109,7 +109,7 @@ def inverse_dynamics(
         raise InputError(f"payload_as is {payload_as!r}; it must be 'mass' or 'force'")
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
-    motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]
+    motion = [x.reshape(-1, 5) for x in (positions, rates, accelerations)]
     outside = [] if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
     push = None if tip_force is None else matched("tip_force", tip_force, shape)
     twist = None if tip_moment is None else matched("tip_moment", tip_moment, shape)
@@ -121,21 +121,29 @@ def inverse_dynamics(
     )
     model = regrouped(boom, payload_as)
     rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) if drive_inertia else None
-    for start in range(0, count, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        state = _state(*(x[part] for x in motion))
-        plane = _plane(boom, state, *(_columns(x[part]) for x in outside))
-        applied = _Applied(*(None if x is None else _into_plane(state, _columns(x[part])) for x in (push, twist)))
-        _newton_euler(model, state, plane, applied, out.part(part))
+
+    def fill(motion: list[Array], outside: list[Array], push: Array | None, twist: Array | None, out: _Outputs) -> None:
+        state = _state(motion)
+        plane = _plane(boom, state, *map(_columns, outside))
+        force = None if push is None else _into_plane(state, _columns(push))
+        moment = None if twist is None else _into_plane(state, _columns(twist))
+        _newton_euler(model, state, plane, force, moment, out)
         if friction:
-            out.tau[part] += boom.friction.torque(motion[1][part])
+            out.tau[:] += boom.friction.torque(motion[1])
         if rotors is not None:
-            out.tau[part] += rotors * motion[2][part]
-    return Loads(
-        tau=out.tau.reshape(*shape, 5),
-        pins=None if out.pins is None else PinForces(*(p.reshape(*shape, 3) for p in out.pins)),
-        mount=None if out.mount is None else out.mount.reshape(*shape, 6),
-    )
+            out.tau[:] += rotors * motion[2]
+
+    if count <= _CHUNK:
+        fill(motion, outside, push, twist, out)
+    else:
+        for start in range(0, count, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            applied, turned = (None if x is None else x[part] for x in (push, twist))
+            fill([x[part] for x in motion], [x[part] for x in outside], applied, turned, out.part(part))
+    pins, mount = None, None
+    if out.pins is not None and out.mount is not None:
+        pins, mount = PinForces(*(p.reshape(*shape, 3) for p in out.pins)), out.mount.reshape(*shape, 6)
+    return Loads(out.tau.reshape(positions.shape), pins, mount)
 
 
 def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
@@ -233,9 +241,10 @@ class _State(NamedTuple):
     qdd: Sequence[_Value]
 
 
-def _state(*motion: Array) -> _State:
-    if len(motion[0]) == 1:
-        return _State(*(x[0].tolist() for x in motion))
+def _state(motion: list[Array]) -> _State:
+    q, qd, qdd = motion
+    if len(q) == 1:
+        return _State(q[0].tolist(), qd[0].tolist(), qdd[0].tolist())
     return _State(*(list(np.ascontiguousarray(x.T)) for x in motion))
 
 
@@ -244,22 +253,19 @@ def _columns(vectors: Array) -> Sequence[_Value]:
     return vectors[0].tolist() if len(vectors) == 1 else list(vectors.T)
 
 
+_Vector = tuple[_Value, _Value, _Value]
+"""Along the axes x, z and n of the arm's plane."""
+
+
 class _Plane(NamedTuple):
-    """How the arm's plane moves, along its axes x, z and n; three entries (n,) or 0 each."""
+    """How the arm's plane moves; entries (n,) or a number each."""
 
-    lift: tuple[_Value, _Value, _Value]
+    lift: _Vector
     """minus gravity"""
-    a: tuple[_Value, _Value, _Value]
+    a: _Vector
     """a0 minus gravity"""
-    W: tuple[_Value, _Value, _Value]
-    W1: tuple[_Value, _Value, _Value]
-
-
-class _Applied(NamedTuple):
-    """Force and moment on the tip along the plane's axes."""
-
-    force: tuple[_Value, _Value, _Value] | None
-    moment: tuple[_Value, _Value, _Value] | None
+    W: _Vector
+    W1: _Vector
 
 
 class _Outputs(NamedTuple):
@@ -285,7 +291,7 @@ def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise InputError(f"{name} has shape {values.shape}; it does not match states of shape {(*shape, 5)}") from None
 
 
-def _into_plane(state: _State, vector: Sequence[_Value]) -> tuple[_Value, _Value, _Value]:
+def _into_plane(state: _State, vector: Sequence[_Value]) -> _Vector:
     """A vector along frame 1 to x, z and n of the plane."""
     c, s = _cosine_and_sine(state.q[0])
     return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
@@ -310,7 +316,7 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
 
     C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
     """
-    A: _Rows = [[0.0] * 11, [0.0] * 11, [0.0] * 11] if isinstance(rho, float) else np.empty((3, 11, *rho.shape))
+    A: Any = [[0.0] * 11, [0.0] * 11, [0.0] * 11] if isinstance(rho, float) else np.empty((3, 11, *rho.shape))
     Ax, Az, An = A
     w1, w2, w3 = plane.W
     d1, d2, d3 = plane.W1
@@ -338,24 +344,27 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
     Ax[_RHO] = rho * Ax[_E3] + (qdd[3] * c - turning * s)
     Az[_RHO] = rho * Az[_E3] + (qdd[3] * s + turning * c)
     An[_RHO] = rho * An[_E3] + slide * (w1 * s - w2 * c)
-    return A
+    rows: _Rows = A
+    return rows
 
 
-def _newton_euler(model: Regrouped, state: _State, plane: _Plane, applied: _Applied, out: _Outputs) -> None:
-    """Fills the outputs of a chunk."""
+def _newton_euler(
+    model: Regrouped, state: _State, plane: _Plane, force: _Vector | None, moment: _Vector | None, out: _Outputs
+) -> None:
+    """Fills the outputs of a chunk, under a force and a moment on the tip."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
     (c2, s2), (c3, s3), (ct, st) = _cosine_and_sine(q[1]), _cosine_and_sine(q[2]), _cosine_and_sine(q[2] + q[4])
     A = _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), rho)
     rows = model.rows if out.pins is not None else model.torque_rows
-    U = np.array(A) @ rows.T if isinstance(A, list) else rows @ A
+    U = np.array(A[0] + A[1] + A[2]).reshape(3, 11).dot(rows.T) if isinstance(A, list) else rows @ A
     if model.hanging:
         _put_on(
             U, model.payload, (-model.hanging * plane.lift[0], -model.hanging * plane.lift[1], -model.hanging * plane.lift[2])
         )
-    if applied.force is not None:
-        _put_on(U, model.tip, applied.force)
-    moment = (0.0, 0.0, 0.0) if applied.moment is None else applied.moment
+    if force is not None:
+        _put_on(U, model.tip, force)
+    mx, mz, mn = (0.0, 0.0, 0.0) if moment is None else moment
     Ux, Uz, Un = U.tolist() if isinstance(A, list) else U
 
     def about(c: _Value, s: _Value, e: int, p: int) -> _Value:
@@ -363,16 +372,19 @@ def _newton_euler(model: Regrouped, state: _State, plane: _Plane, applied: _Appl
         turned: _Value = c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
         return turned
 
-    on_tool = about(ct, st, _ET, _PT) - moment[2]
+    on_tool = about(ct, st, _ET, _PT) - mn
     beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
     # of the vectors b along x and z, less those of the base itself, for moments that need all of the boom
     reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
-    tau = out.tau
-    tau[:, 0] = Ux[_N] - Un[_X] - reach - moment[1]
-    tau[:, 1] = about(c2, s2, _E2, _P2)
-    tau[:, 2] = about(c3, s3, _E3, _P3) + beyond_actuator
-    tau[:, 3] = c3 * Ux[_RHO] + s3 * Uz[_RHO]
-    tau[:, 4] = on_tool
+    tau_1 = Ux[_N] - Un[_X] - reach - mz
+    tau_2 = about(c2, s2, _E2, _P2)
+    tau_3 = about(c3, s3, _E3, _P3) + beyond_actuator
+    tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
+    tau = (tau_1, tau_2, tau_3, tau_4, on_tool)
+    if isinstance(A, list):
+        out.tau[0] = tau
+    else:
+        np.stack(tau, axis=-1, out=out.tau)
     if out.pins is None or out.mount is None:
         return
 
@@ -388,15 +400,15 @@ def _newton_euler(model: Regrouped, state: _State, plane: _Plane, applied: _Appl
         out.pins[pin, :, 0], out.pins[pin, :, 2] = x, z
 
     rise = (s2 * Un[_E2] + c2 * Un[_P2]) + (s3 * Un[_E3] + c3 * Un[_P3]) + rho * s3 * Un[_RHO] + (st * Un[_ET] + ct * Un[_PT])
-    Mx = Un[_Z] - Uz[_N] + rise - moment[0]
-    Mn = Uz[_X] - Ux[_Z] + tau[:, 1] + tau[:, 2]
+    Mx = Un[_Z] - Uz[_N] + rise - mx
+    Mn = Uz[_X] - Ux[_Z] + tau_2 + tau_3
     c1, s1 = _cosine_and_sine(q[0])
     mount = out.mount
     for row, along, normal in ((0, Ux[_O], Un[_O]), (3, Mx, Mn)):
         mount[:, row] = -(c1 * along + s1 * normal)
         mount[:, row + 1] = -(s1 * along - c1 * normal)
     mount[:, 2] = -Uz[_O]
-    mount[:, 5] = -tau[:, 0]
+    mount[:, 5] = -tau_1
 
 
 def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
@@ -406,7 +418,7 @@ def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
     return u - 1.0, u * t
 
 
-def _put_on(U: Array, g: Array, force: tuple[_Value, _Value, _Value]) -> None:
+def _put_on(U: Array, g: Array, force: _Vector) -> None:
     """Take a force at the point g off what the bodies need, in place."""
     for row, along in zip(U, force, strict=True):
         taken = np.multiply.outer(g, along)

@@ -232,7 +232,7 @@ def simulate(
     resolution = _resolutions(plant)
     keep = np.exp(-2.0 * np.pi * figures.velocity_filter_Hz * T)
     teeth, holding, drag, micro = _stepper_figures(plant)
-    pulled = np.ix_(steppers, plant.elastic) if steppers.size else None  # torques that come from a stepper's field
+    pulled = np.ix_(steppers, np.array(plant.elastic)) if steppers.size else None  # torques that come from a stepper's field
     field, field_speed = (reference[:, row[steppers]][:, :, E] for reference in (table.q, table.qd))
     field = np.rint(field / micro) * micro
     alive, ended, lost = np.ones(B, dtype=bool), np.full(B, np.nan), np.full((B, 5), np.nan)

@@ -319,7 +319,8 @@ def accelerations(
         load = spring_torque(plant, q, theta - q[:, E], C)
         passed = load + plant.damping * (theta_d - qd[:, E])
         tau[:, E] = passed
-        tau[:, 3] += 0.5 * np.einsum("bm,bm,bm->b", load, load, C_4)  # a bent extension pushes itself out: so the energy is kept
+        # A bent extension pushes itself out: so the energy is kept.
+        tau[:, 3] += 0.5 * np.einsum("bm,bm,bm->b", load, load, C_4)
         thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.elastic_rotor
     if plant.joints_rub:
         direction = np.tanh(qd / np.radians(plant.figures.stick_deg_s))

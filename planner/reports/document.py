@@ -28,7 +28,7 @@ FORMS = (".md", ".html", ".pdf")
 _TEXT = 8  # [pt]
 _PADDING = 0.6  # [mm]
 _WITH_HEADING = 25.0  # [mm], least space below a heading on its page
-_LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "control")
+_LIBRARIES = ("numpy", "scipy", "toppra", "ruckig")
 _STYLE = (
     "body{font-family:sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;font-size:.85em}td,th{border:1px solid #bbb;padding:.25em .5em;text-align:left}"
