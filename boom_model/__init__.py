@@ -1,5 +1,8 @@
-"""The boom itself: geometry, bodies, limits and drives, and its kinematics and dynamics. It knows nothing of time
-profiles, screens or files, its own TOML aside."""
+"""Model of the boom: geometry, bodies, limits, drives, kinematics and dynamics.
+
+The package knows no time profiles and no pictures. The only files that it reads are TOML files of
+the boom and of the catalogue.
+"""
 
 from boom_model.boom import JOINTS, Body, Boom, Friction, Geometry, Limits, Mount
 from boom_model.drives.catalogue import Catalogue

@@ -1,4 +1,4 @@
-"""The one check of arrays at the public boundary, and read-only arrays for frozen data."""
+"""Checks of arrays at the public boundary, and read-only arrays for frozen data."""
 
 from math import isfinite
 
@@ -12,21 +12,23 @@ Mask = NDArray[np.bool_]
 
 
 def read_only(values: ArrayLike) -> Array:
-    """A float64 copy that cannot be written to."""
+    """Return a float64 copy that cannot be written to."""
     array = np.array(values, dtype=float)
     array.flags.writeable = False
     return array
 
 
 def checked(name: str, values: ArrayLike, last: int | None = None) -> Array:
-    """`values` as float64 of shape (..., last), all finite.
+    """Return `values` as a float64 array of shape (..., last) with finite entries.
 
     Args:
-        name: what the message calls it.
+        name: name of the array in messages.
+        values: numbers.
         last: required length of the last axis; None accepts any shape.
 
     Raises:
-        InputError: not numbers, wrong last axis, NaN or infinite; names the first offending index.
+        InputError: `values` are not numbers, have the wrong last axis, or contain NaN or infinity;
+            the message names the first offending index.
     """
     try:
         array: Array = np.asarray(values, dtype=float)
@@ -43,10 +45,10 @@ def checked(name: str, values: ArrayLike, last: int | None = None) -> Array:
 
 
 def scalar(name: str, value: ArrayLike) -> float:
-    """`value` as one finite number.
+    """Return `value` as one finite number.
 
     Raises:
-        InputError: not a number, not finite, or more than one; names it.
+        InputError: `value` is not a number, not finite, or more than one number.
     """
     array = checked(name, value)
     if array.shape != ():
@@ -55,10 +57,10 @@ def scalar(name: str, value: ArrayLike) -> float:
 
 
 def broadcast(**named: ArrayLike) -> tuple[Array, ...]:
-    """The named joint arrays, each checked as (..., 5), broadcast to one shape.
+    """Return the named joint arrays, each checked as (..., 5), broadcast to one shape.
 
     Raises:
-        InputError: as `checked`, or shapes that do not broadcast.
+        InputError: as `checked`, or the shapes do not broadcast.
     """
     arrays = [checked(name, values, 5) for name, values in named.items()]
     if len({array.shape for array in arrays}) == 1:

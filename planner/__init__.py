@@ -1,8 +1,8 @@
-"""Moves that are planned and checked, and what people keep of them: reports, recordings, files.
+"""Planning and checking of moves; reports, recordings and files of the results.
 
-`planner` offers what a notebook starts with; the rest stands in its rooms (`planner.checks.certificate` and so on). A name is
-imported when it is first used: the command imports this package before it can handle a signal, so that even `typing` would
-take too long here.
+`planner` exports the names that a notebook starts with. The others are in its subpackages, for
+example `planner.checks.certificate`. A name is imported when it is first used. The command imports
+this package before it can handle a signal, so even importing `typing` here would take too long.
 """
 
 TYPE_CHECKING = False  # as in `typing`; a type checker takes it for True

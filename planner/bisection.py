@@ -1,4 +1,4 @@
-"""Where something starts, or ceases, to work."""
+"""Bisection for the boundary between values that work and values that do not."""
 
 from collections.abc import Callable
 
@@ -8,12 +8,17 @@ import numpy as np
 def bisect(
     works: Callable[[float], bool], good: float, bad: float, *, steps: int = 60, within: float = 0.0, geometric: bool = False
 ) -> float:
-    """The value nearest to `bad` that was seen to work, or `good`, which is not tried.
+    """Return the value nearest to `bad` that works.
+
+    If no value between the two works, return `good`, which is taken to work and is not tried.
 
     Args:
-        steps: halvings at most.
-        within: halving ends when good and bad are less than this apart.
-        geometric: halve the ratio of good and bad, and not their difference.
+        works: whether a value works.
+        good: value that works.
+        bad: value that does not work.
+        steps: largest number of halvings.
+        within: distance of good and bad at which halving ends.
+        geometric: whether to halve the ratio of good and bad instead of their difference.
     """
     for _ in range(steps):
         if abs(bad - good) < within:

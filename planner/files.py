@@ -1,4 +1,7 @@
-"""Whole files or none: written in a hidden folder beside their place, and moved there together."""
+"""Output files that are either all complete or all left as they were.
+
+They are written in a hidden folder next to their destination and moved into place together.
+"""
 
 import errno
 import fcntl
@@ -21,21 +24,24 @@ _UNFINISHED: set[str] = set()
 
 
 class Outputs:
-    """The files of one command: all of them move into place together when the block ends well, and none otherwise.
+    """Output files of one command, as a context manager.
 
-    A hidden folder stands beside the places until then, and a lock on it for as long as this process lives: a folder without
-    one was left by a process that was killed, and the next to write there removes it.
+    All of them move into place when the block ends without an exception, and none otherwise. Until
+    then they are in a hidden folder next to their destination, which this process locks while it
+    lives. A hidden folder without a lock was left by a killed process; the next process that writes
+    there removes it.
     """
 
     def __init__(self, *paths: str | Path | None, inputs: Iterable[str | Path | None] = ()) -> None:
-        """Checks that the files can be written, one each, before the work that fills them; None stands for no file.
+        """Check that the files can be written, before the work that fills them.
 
         Args:
+            *paths: the files to write; None stands for no file.
             inputs: files that the same command reads.
 
         Raises:
-            InputError: two of the files are the same, one is read as well, it exists and is no regular file, or its folder is
-                missing or cannot be written to.
+            InputError: two of the files are the same; or a file is read as well, exists and is not
+                a regular file, or has a folder that is missing or not writable.
         """
         read = {os.path.realpath(path) for path in inputs if path is not None}
         self._given: dict[Path, str] = {}
@@ -54,7 +60,10 @@ class Outputs:
             pass
 
     def temporary(self, path: str | Path) -> str:
-        """Where to write what becomes `path`; what else is written in that folder is moved along."""
+        """Return the name to write to instead of `path`.
+
+        Other files in the folder of that name are moved into place as well.
+        """
         place = Path(os.path.realpath(path))
         return os.path.join(self._folders[place.parent][0], place.name)
 
@@ -102,7 +111,7 @@ class Outputs:
         self._folders = {}
 
     def _named(self, message: str) -> str:
-        """The message with the places in it, and not the hidden folders."""
+        """Return a message with the given names in place of the hidden ones."""
         for place, given in self._given.items():
             message = message.replace(self.temporary(place), given)
         for parent, (folder, _) in self._folders.items():
@@ -112,10 +121,12 @@ class Outputs:
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[str]:
-    """A temporary name to write to; moved onto `path` when the block ends well, removed when it does not.
+    """Yield a temporary name to write to, which becomes `path` when the block ends.
+
+    If the block raises, the temporary file is removed and an existing file is left as it was.
 
     Raises:
-        InputError: the folder is missing or cannot be written to, or the disk refuses; an old file is left as it was.
+        InputError: the folder is missing or not writable, or writing fails.
     """
     with Outputs(path) as files:
         try:
@@ -125,16 +136,18 @@ def replacing(path: str | Path) -> Iterator[str]:
 
 
 def discard() -> None:
-    """Removes what this process has not finished writing, before it ends without unwinding."""
+    """Remove unfinished files of this process, before it ends without unwinding."""
     for folder in list(_UNFINISHED):
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def named_file(folder: Path, name: str, kind: str) -> Path:
-    """A TOML file by its name in a folder of the toolkit, or by its path (a name that ends in .toml).
+    """Return the path of a TOML file, given its name in a folder of the toolkit or its path.
+
+    A name that ends in .toml is a path.
 
     Raises:
-        InputError: no file of that name; lists those there are.
+        InputError: there is no file of that name; the message lists the known names.
     """
     if name.endswith(".toml"):
         return Path(name)
@@ -153,7 +166,7 @@ def _require_regular(place: Path, given: str) -> None:
 
 
 def _hidden_folder(parent: Path) -> tuple[str, int]:
-    """A new folder in `parent` and the handle of its lock."""
+    """Make a new folder in `parent`; return it and the handle of its lock."""
     for _ in range(_TRIES):
         folder = tempfile.mkdtemp(prefix=_PREFIX, dir=parent)
         with suppress(FileNotFoundError, BlockingIOError):  # another process took it for abandoned
@@ -166,7 +179,7 @@ def _hidden_folder(parent: Path) -> tuple[str, int]:
 
 
 def _remove_abandoned(parent: Path) -> None:
-    """Removes the hidden folders in `parent` that no living process holds."""
+    """Remove the hidden folders in `parent` that no living process has locked."""
     with os.scandir(parent) as entries:
         folders = [entry.path for entry in entries if entry.name.startswith(_PREFIX) and entry.is_dir(follow_symlinks=False)]
     for folder in folders:
@@ -180,7 +193,10 @@ def _remove_abandoned(parent: Path) -> None:
 
 
 def _lock(handle: int) -> bool:
-    """Whether the lock is this process's now; a file system without locks has nobody who could take it."""
+    """Lock a folder; return whether this process has the lock.
+
+    On a file system without locks this is taken for granted.
+    """
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
@@ -192,7 +208,7 @@ def _lock(handle: int) -> bool:
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Puts signals off until the block ends; signals reach the main thread alone."""
+    """Defer signals until the block ends. Only the main thread receives signals."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,7 +1,7 @@
-"""The description of a move, which Python, the command and mission files share.
+"""Description of a move, shared by Python, the command and mission files.
 
-`MoveSpec` is the move as objects, `MoveWords` the same in words. The options of the command are made from the fields of
-`MoveWords`, so that a new one is described once.
+`MoveSpec` describes a move with objects, `MoveWords` with words. The options of the command are
+made from the fields of `MoveWords`, so a new option is described once.
 """
 
 from collections.abc import Sequence
@@ -25,25 +25,25 @@ from planner.timing.timing import Timing
 
 @dataclass(frozen=True, eq=False)
 class MoveSpec:
-    """A move as it is asked for. `MoveSpec.of` builds it from words or objects, and checks it."""
+    """Description of a move. `MoveSpec.of` makes one from words or objects, and checks it."""
 
     start: Target
     goal: Target
     via: tuple[Target, ...]
     """Targets on the way."""
     stop_at_via: bool
-    """Whether the move stops at them; else it passes them on a smooth path."""
+    """Whether the move stops at them; if not, it passes them on a smooth path."""
     constraint: Constraint
     """The extra constraint of tip targets."""
     pitch: float | None
-    """End effector's elevation at tip targets [rad]; None lets the constraint choose it."""
+    """Elevation of the end effector at tip targets [rad]; None lets the constraint choose it."""
     along: Along
-    """What goes straight: "joint", "line", or a point (3,) [m] on an arc of the tip."""
+    """Kind of path: "joint", "line", or a point (3,) [m] on an arc of the tip."""
     profile: TimingProfile
     duration: float | None
-    """[s]; None is the least that the limits allow."""
+    """[s]; None is the shortest that the limits allow."""
     rate: float | None
-    """[Hz] of a controller, on whose clock samples and stops are."""
+    """Rate of a controller [Hz], on whose clock samples and stops lie."""
     vehicle: VehicleCase
     step: float
     """Longest sampling step [s]; with a rate, its period."""
@@ -64,25 +64,31 @@ class MoveSpec:
         vehicle: str | VehicleCase = LEVEL,
         step: float = STEP,
     ) -> "MoveSpec":
-        """A move from words, as in the command, or from objects.
+        """Return a move from words, as in the command, or from objects.
 
         Args:
-            start, goal, via: "transport", "q=0,90,180,0,0" (deg, the extension in m), "tip=1.4,0,1.0" (m), a joint position
-                (5,) [rad, the extension in m], or a TipTarget.
-            stop_at_via: a cubic with velocities at its waypoints passes them whatever this says.
-            constraint: "horizontal", "least-torque", "extension=0.25", ..., or the constraint itself.
-            pitch: "down", "level", "up", degrees as text, or [rad]; "free" or None lets the constraint choose it.
-            along: "joint", "line", "arc=X,Y,Z", or the arc's point (3,) [m].
-            profile: "cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal", or a profile with its options, such as
-                TimeOptimal(jerk_bound=True).
-            duration: [s]; None is the least that the limits allow. A longer one slows the least-time motion evenly.
-            rate: a controller's [Hz]: the samples are on its clock, and the move lasts a whole number of its periods, from
-                stop to stop. Takes the place of `step`.
-            vehicle: "slope", a FILE.toml, or a case. Planning accounts for its slope only; checks include track and shock.
+            start: "transport", "q=0,90,180,0,0" (deg, m for the extension), "tip=1.4,0,1.0" (m), a
+                joint position (5,) [rad, m for the extension], or a TipTarget.
+            goal: as `start`.
+            via: targets on the way, each as `start`.
+            stop_at_via: whether to stop at them. A cubic with velocities at waypoints never does.
+            constraint: "horizontal", "least-torque", "extension=0.25", ..., or a constraint object.
+            pitch: "down", "level", "up", degrees as text, or [rad]; "free" or None lets the
+                constraint choose it.
+            along: "joint", "line", "arc=X,Y,Z", or a point (3,) [m] on the arc.
+            profile: "cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal", or a profile
+                with its options, such as TimeOptimal(jerk_bound=True).
+            duration: [s]; None is the shortest that the limits allow. A longer one slows that
+                motion down uniformly.
+            rate: rate of a controller [Hz]. The samples lie on its clock, and the motion from stop
+                to stop lasts a whole number of its periods. Replaces `step`.
+            vehicle: "slope", a FILE.toml, or a vehicle case. Planning accounts for its slope only;
+                checks include track and shock.
             step: longest sampling step [s].
 
         Raises:
-            InputError: a word is not known, a number is malformed or out of range, or the samples would be too many.
+            InputError: a word is unknown, a number is malformed or out of range, or there would be
+                too many samples.
 
         >>> MoveSpec.of("transport", "tip=1.4,0,1.0", profile="time-optimal", constraint="least-torque").profile
         TimeOptimal(jerk_bound=False, average_torque=False)
@@ -122,7 +128,7 @@ class MoveSpec:
 
 @dataclass(frozen=True)
 class Word:
-    """What people are told of a word of a move: its form, its meaning, and its bounds."""
+    """Help text, form, choices and bounds of a field of `MoveWords`."""
 
     help: str
     form: str | None = None
@@ -138,44 +144,45 @@ def _word(
 
 @dataclass(frozen=True)
 class MoveWords:
-    """A move in words, as the command's options and a mission's keys give it."""
+    """Description of a move in words: the options of the command and the keys of a mission."""
 
     start: str
     goal: str
     profile: str = _word("cubic", "How the path is timed.", choices=tuple(map(str, PROFILES)))
-    via: tuple[str, ...] = _word((), "A target on the way, with a stop; may be given again.", "TARGET")
+    via: tuple[str, ...] = _word((), "Target on the way, with a stop there; may be repeated.", "TARGET")
     pass_via: bool = _word(False, "Pass the targets on the way on a smooth path, without a stop.")
     via_velocity: tuple[str, ...] = _word(
         (),
-        "The cubic's velocity at each --via, in turn, without a stop; otherwise its acceleration is continuous there.",
+        "Velocity of the cubic at each --via in order, without a stop. Default: continuous acceleration.",
         "DEG/S,DEG/S,DEG/S,M/S,DEG/S",
     )
     along: str = _word(
         "joint",
-        "What goes straight: the joints, or the tip from tip target to tip target; or an arc of the tip through a point.",
+        "Kind of path: straight in the joints, a line between tip targets, or an arc of the tip through a point.",
         "joint|line|arc=X,Y,Z",
     )
-    duration: float | None = _word(None, "Duration; otherwise the least that the limits allow.", "S", quantity=DURATION)
+    duration: float | None = _word(None, "Duration. Default: the shortest that the limits allow.", "S", quantity=DURATION)
     jerk_bound: bool = _word(False, "Keep the jerk limits as well (time-optimal profile).")
     average_torque: bool = _word(False, "Keep the gearboxes' average torque as well (time-optimal profile).")
-    rate: float | None = _word(None, "Sample at a controller's rate; the move ends on its clock.", "HZ", quantity=RATE)
+    rate: float | None = _word(None, "Rate of a controller; samples and stops lie on its clock.", "HZ", quantity=RATE)
     pitch: str = _word(
-        "down", "Elevation of the end effector at a tip target; free lets the constraint choose it.", "down|level|up|free|DEG"
+        "down", "Elevation of the end effector at a tip target; free: the constraint chooses it.", "down|level|up|free|DEG"
     )
     constraint: str = _word("horizontal", f"Extra constraint of a tip target: {CONSTRAINTS}.", "CONSTRAINT")
     vehicle: str | None = _word(
-        None, "What the vehicle does meanwhile: slope, track, shock, ditch or a FILE.toml; otherwise it rests.", "CASE"
+        None, "Vehicle case: slope, track, shock, ditch or a FILE.toml. Default: at rest on level ground.", "CASE"
     )
 
     def spec(self) -> MoveSpec:
         """Return the move as objects.
 
         Raises:
-            InputError: a word is not known, a number is malformed or out of range, or options contradict each other.
+            InputError: a word is unknown, a number is malformed or out of range, or options
+                contradict each other.
         """
-        if self.via_velocity and len(self.via_velocity) != len(self.via):
-            raise InputError(f"{len(self.via_velocity)} --via-velocity for {len(self.via)} --via; give one for each")
         velocities = [parse_joint_velocity(text) for text in self.via_velocity]
+        if velocities and len(velocities) != len(self.via):
+            raise InputError(f"via velocity: {len(velocities)} given for {len(self.via)} via; give one for each")
         return MoveSpec.of(
             self.start,
             self.goal,

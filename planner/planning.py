@@ -1,4 +1,4 @@
-"""The main job: from two targets to a motion that has been checked."""
+"""Planning and checking of a move between two targets."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from boom_model.boom import LOAD_UNITS
 from boom_model.drives.drive import drive_torque_limit
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import Constraint
-from planner.checks.certificate import certified
+from planner.checks.certificate import certificate_of
 from planner.checks.drives.duty import Duty
 from planner.checks.evaluation import Evaluation, at_samples, evaluate
 from planner.checks.motion_checks import check_rows
@@ -41,34 +41,36 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Move:
-    """A motion and its report. What the report does not need is evaluated when it is asked for."""
+    """Motion and its report. Anything that the report does not need is computed on first use."""
 
     profile: str
-    """The profile's name, or what a motion from elsewhere is called."""
+    """Name of the profile, or of a motion that was not planned here."""
     trajectory: Trajectory
-    """The samples. Those of a plan know the continuous motion that they were taken from."""
+    """Samples of the motion. Those of a plan refer to the continuous motion behind them."""
     evaluation: Evaluation
-    """What the report was made from: a plan on its fine grid, a motion from elsewhere at its samples."""
+    """Evaluation behind the report: a plan on its fine grid, any other motion at its samples."""
     report: Report
-    """Without the stop analysis; see `full_report`."""
+    """Report without the stop analysis; see `full_report`."""
 
     @property
     def boom(self) -> Boom:
+        """Boom that moves."""
         return self.evaluation.boom
 
     @property
     def vehicle(self) -> VehicleCase:
+        """Motion of the vehicle under the boom."""
         return self.evaluation.vehicle
 
     @property
     def motions(self) -> tuple[Motion, ...]:
-        """The continuous motions behind a plan's samples, from stop to stop; none of an empty move or other motions."""
+        """Continuous motions of a plan from stop to stop; () for an empty move or other motions."""
         planned = self.evaluation.planned
         return () if planned is None else planned.motions
 
     @cached_property
     def sampled(self) -> Evaluation:
-        """The evaluation at the trajectory's samples, for what is shown or written at them."""
+        """Evaluation at the trajectory's samples, for plots and files."""
         evaluation = self.evaluation
         if evaluation.trajectory is self.trajectory:
             return evaluation
@@ -81,23 +83,24 @@ class Move:
 
     @cached_property
     def parts(self) -> Breakdown:
-        """Parts of the torques at the samples, friction included."""
+        """Parts of the torques at the samples, including friction."""
         return _parts(self.sampled)
 
     @cached_property
     def stop(self) -> WorstStop | None:
-        """The longest and the farthest stop on the way of a plan; None of other motions."""
+        """Longest and farthest stop on the way of a plan; None for other motions."""
         return worst_stop(self.boom, self.motions, self.vehicle.tilt) if self.motions else None
 
     @cached_property
     def full_report(self) -> Report:
-        """The report with the stop analysis, which takes longer than the rest of it."""
+        """Report with the stop analysis, which takes longer than the rest of the report."""
         return replace(self.report, stop=self.stop)
 
     def torque_limits(self) -> Array:
-        """Joint torque (n, 5) that each drive allows at the samples' speeds [Nm]; infinite where no limit is known.
+        """Return the torque (n, 5) [Nm] that each drive allows at the samples' speeds.
 
-        See `drive_torque_limit`: it bounds the torque with the drive's own inertia added.
+        It is infinite where no limit is known. It bounds the joint torque plus the torque for the
+        drive's own inertia; see `drive_torque_limit`.
         """
         limits = np.full(self.trajectory.q.shape, np.inf)
         for i, drive in enumerate(self.boom.drives):
@@ -107,22 +110,22 @@ class Move:
         return limits
 
     def to_table(self) -> "pa.Table":
-        """The samples with their torques: t, q1..q5, qd1..qd5, qdd1..qdd5, tau1..tau5 in SI."""
+        """Return the samples and torques: t, q1..q5, qd1..qd5, qdd1..qdd5, tau1..tau5 in SI."""
         return motion_table(self.trajectory, self.loads.tau)
 
     def plot(self) -> "Figure":
-        """A figure of positions, speeds, accelerations and torques over time."""
+        """Return a figure of positions, velocities, accelerations and torques over time."""
         from planner.reports.move_pictures import move_figure
 
         return move_figure(self.boom, self.trajectory, self.loads.tau)
 
     def record(self, path: str | Path) -> None:
-        """Writes the move as a Rerun recording; `boom view` or `rerun` shows it.
+        """Write the move as a Rerun recording, which `boom view` or `rerun` shows.
 
         Raises:
-            InputError: the file cannot be written; an old one is left as it was.
+            InputError: the file cannot be written. An existing file is left unchanged.
         """
-        from planner.recording import write_recording  # above this module in the order of rooms, and slow to import
+        from planner.recording import write_recording  # slow to import, and a room above this one
 
         write_recording(path, self)
 
@@ -163,12 +166,14 @@ def plan(
     vehicle: str | VehicleCase = LEVEL,
     step: float = STEP,
 ) -> Move:
-    """A move from start to goal, rest to rest, checked on a grid finer than its samples. `MoveSpec.of` has the arguments.
+    """Plan a move from rest at start to rest at goal; check it on a grid finer than its samples.
+
+    `MoveSpec.of` describes the arguments, with their units.
 
     Raises:
         InputError: an input is malformed or not finite.
-        InfeasibleError: a target is out of reach or outside the limits, the duration is too short, something to be kept
-            away from is in the way, or no motion keeps the drives' limits.
+        InfeasibleError: a target is out of reach or outside the limits, the duration is too short,
+            a keep-out shape blocks the way, or no motion respects the drive limits.
 
     >>> move = plan(Boom.load(), "transport", "phenotyping", profile="time-optimal")
     >>> move
@@ -192,40 +197,53 @@ def plan(
 
 
 def plan_move(boom: Boom, spec: MoveSpec) -> Move:
-    """`plan` of a description."""
+    """Plan and check the move that `spec` describes.
+
+    Raises:
+        InputError: as `plan`.
+        InfeasibleError: as `plan`.
+    """
     planned = plan_motion(boom, spec)
     return _move(evaluate(boom, planned, vehicle=spec.vehicle), planned.trajectory, str(spec.profile))
 
 
 def plan_motion(boom: Boom, spec: MoveSpec, reference: ArrayLike | None = None) -> PlannedMotion:
-    """The motions of a move from stop to stop, without loads or checks.
+    """Plan the motions of a move from stop to stop, without loads or checks.
 
     Args:
-        reference: joint position (5,) that the start of a tip line or arc is nearest to; None is the middle of the ranges.
+        boom: the boom.
+        spec: the move.
+        reference: joint position (5,). The start of a tip line or arc is chosen nearest to it; None
+            is the middle of the joint ranges.
 
     Raises:
-        InputError, InfeasibleError: as `plan`.
+        InputError: as `plan`.
+        InfeasibleError: as `plan`.
     """
     paths, notes = legs(boom, spec.targets, spec.pitch, spec.constraint, spec.along, spec.stop_at_via, reference)
     if not paths:
         q = resolve(boom, spec.start, spec.pitch, spec.constraint)
-        note = "start and goal are the same joint position: an empty move, of no duration"
+        note = "start and goal are the same joint position: an empty move of duration 0 s"
         return PlannedMotion((), q, spec.step, (note,))
     motions = timed(boom, paths, spec.timing, spec.vehicle.tilt)
-    lasts = sum(motion.duration for motion in motions)
-    if spec.rate is not None and spec.duration is not None and lasts > spec.duration * (1.0 + _ROUNDING):
-        notes = (*notes, f"lengthened from {spec.duration:g} s to {lasts:g} s by the controller's clock")
+    total = sum(motion.duration for motion in motions)
+    if spec.rate is not None and spec.duration is not None and total > spec.duration * (1.0 + _ROUNDING):
+        notes = (*notes, f"duration increased from {spec.duration:g} s to {total:g} s to fit the controller's rate")
     return PlannedMotion(motions, motions[0].path(0.0), spec.step, notes, spec.profile.limits_average_torque)
 
 
 def plan_each_profile(boom: Boom, start: Target, goal: Target, track: Track = iter) -> list[Trajectory]:
-    """The move in the least time of each profile, as samples alone.
+    """Plan the move with every profile in its shortest time, and return the samples.
 
     Args:
-        track: iterates over the profiles, and may show how far it is.
+        boom: the boom.
+        start: where the move starts; see `MoveSpec.of`.
+        goal: where the move ends; see `MoveSpec.of`.
+        track: iterates over the profiles, and may show progress.
 
     Raises:
-        InputError, InfeasibleError: as `plan`.
+        InputError: as `plan`.
+        InfeasibleError: as `plan`.
     """
     specs = [MoveSpec.of(start, goal, profile=profile) for profile in PROFILES]
     return [replace(plan_motion(boom, spec).trajectory, planned=None) for spec in track(specs)]
@@ -240,20 +258,26 @@ def check(
     profile: str = "recorded",
     duty: Duty | None = None,
 ) -> Report:
-    """The limit and drive checks of any motion, with the joints' friction where it is known.
+    """Check any motion against the limits of joints and drives, with the joints' known friction.
 
-    A trajectory of a plan is checked between its samples too, so that its report is the plan's; any other at its samples.
+    A trajectory of a plan is checked on the plan's fine grid, so its report is the plan's. Any
+    other trajectory is checked at its samples.
 
     Args:
+        boom: the boom.
+        trajectory: the motion.
         payload_as: see `inverse_dynamics`.
-        vehicle: what the vehicle does meanwhile.
-        profile: what the report calls the motion.
-        duty: the cycle that the samples stand for; None is the motion alone.
+        vehicle: motion of the vehicle under the boom.
+        profile: name of the motion in the report.
+        duty: duty cycle that the samples represent; None is the motion repeated without a pause.
+
+    Raises:
+        InputError: as `evaluate`.
     """
-    return examine(boom, trajectory, payload_as=payload_as, vehicle=vehicle, profile=profile, duty=duty).report
+    return check_motion(boom, trajectory, payload_as=payload_as, vehicle=vehicle, profile=profile, duty=duty).report
 
 
-def examine(
+def check_motion(
     boom: Boom,
     trajectory: Trajectory,
     *,
@@ -262,13 +286,31 @@ def examine(
     profile: str = "recorded",
     duty: Duty | None = None,
 ) -> Move:
-    """Any motion with its loads and its checks, as `write_recording` takes it; for the arguments see `check`."""
+    """Check any motion, and return it with loads and report, as `write_recording` takes it.
+
+    Args:
+        boom: the boom.
+        trajectory: the motion.
+        payload_as: see `inverse_dynamics`.
+        vehicle: motion of the vehicle under the boom.
+        profile: name of the motion in the report.
+        duty: as in `check`.
+
+    Raises:
+        InputError: as `evaluate`.
+    """
     case = load_case(vehicle) if isinstance(vehicle, str) else vehicle
     return _move(evaluate(boom, trajectory, vehicle=case, payload_as=payload_as), trajectory, str(profile), duty)
 
 
 def torques(boom: Boom, trajectory: Trajectory, payload_as: PayloadAs = "mass", vehicle: VehicleCase = LEVEL) -> Array:
-    """Joint torques (n, 5) at a trajectory's samples, with the joints' friction where it is known.
+    """Compute joint torques (n, 5) at a trajectory's samples, with the joints' known friction.
+
+    Args:
+        boom: the boom.
+        trajectory: the samples.
+        payload_as: see `inverse_dynamics`.
+        vehicle: motion of the vehicle under the boom.
 
     Raises:
         InputError: as `inverse_dynamics`, or a torque is not finite.
@@ -285,13 +327,13 @@ def _move(evaluation: Evaluation, trajectory: Trajectory, profile: str, duty: Du
         notes=(*grid.notes, *_vehicle_notes(vehicle)),
         assumptions=assumptions(evaluation.boom, grid.qddd is not None),
         peaks=_peaks(evaluation),
-        certificate=certified(evaluation),
+        certificate=certificate_of(evaluation),
     )
     return Move(profile, trajectory, evaluation, report)
 
 
 def _peaks(evaluation: Evaluation) -> tuple[TorquePeak, ...]:
-    """The largest torque of each joint, in parts."""
+    """Return the largest torque of each joint and its parts."""
     at = np.abs(evaluation.tau).argmax(axis=0)
     return torque_peaks(evaluation.t[at], _parts(evaluation, at))
 
@@ -306,5 +348,5 @@ def _parts(evaluation: Evaluation, samples: Array | slice = slice(None)) -> Brea
 def _vehicle_notes(vehicle: VehicleCase) -> tuple[str, ...]:
     if vehicle is LEVEL:
         return ()
-    planned = "" if vehicle.is_steady else "; a plan knows its slope alone, the checks all of it"
+    planned = "" if vehicle.is_steady else "; planning accounts for the slope only, the checks for all of it"
     return (vehicle.sentence + planned,)

@@ -1,4 +1,4 @@
-"""The profiles side by side on one move."""
+"""Comparison of the profiles on one move."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,21 +19,27 @@ from planner.timing.profile import PROFILES, TimeOptimal, TimingProfile
 
 @dataclass(frozen=True)
 class ProfileRow:
-    """What one profile takes and asks for; ratios are demand / limit at worst, None where nothing gives the limit."""
+    """Duration of one profile and its largest ratios of demand to limit.
+
+    A ratio is None if the limit is not known.
+    """
 
     profile: str
     duration_s: float
+    """Duration [s]."""
     velocity: float
     acceleration: float
     jerk: float | None
-    """None where the acceleration jumps, which takes an infinite jerk."""
+    """Ratio of the jerk; None if the acceleration jumps, because the jerk is then infinite."""
     gearbox_torque: float | None
     motor_torque: float | None
-    """Of the torque that the motor drives at its speed with the margin of a stepper."""
+    """Ratio to the torque that the motor gives at its speed with a stepper's margin."""
     motor_speed: float | None
-    """Of the speed up to which the motor's curve gives the torque that is asked of it."""
+    """Ratio to the speed up to which the motor's curve gives the required torque."""
     stop_s: float
+    """Duration of the longest stop [s]."""
     stop_m: float
+    """Distance of the tip in the farthest stop [m]."""
     verdict: str
 
 
@@ -41,15 +47,19 @@ HEADER = ("profile", "duration", "velocity", "acceleration", "jerk", "gearbox", 
 
 
 def profile_moves(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[dict[str, Move], dict[str, str]]:
-    """One move with every profile, the time-optimal one also with its jerk bounded, by name; and why the others cannot be.
+    """Plan a move with every profile, and with the time-optimal one also with bounded jerk.
 
     Args:
-        spec: the move; its own profile plays no part.
-        track: iterates over the profiles, and may show how far it is.
+        boom: the boom.
+        spec: the move. Its own profile is ignored.
+        track: iterates over the profiles, and may show progress.
+
+    Returns:
+        Moves by the name of the profile, and the reasons for those that are infeasible.
 
     Raises:
         InputError: as `plan`.
-        InfeasibleError: as `plan`, where no profile can make the move.
+        InfeasibleError: as `plan`, if no profile can make the move.
     """
     profiles: list[tuple[str, TimingProfile]] = [(str(name), kind()) for name, kind in PROFILES.items()]
     profiles.append(("time-optimal, jerk bound", TimeOptimal(jerk_bound=True)))
@@ -66,22 +76,22 @@ def profile_moves(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[dict
 
 
 def profile_table(boom: Boom, spec: MoveSpec) -> tuple[ProfileRow, ...]:
-    """The rows of `profile_moves`, with the same arguments."""
+    """Return the rows of `profile_moves`."""
     return profile_rows(profile_moves(boom, spec)[0])
 
 
 def profile_rows(moves: Mapping[str, Move]) -> tuple[ProfileRow, ...]:
-    """A row for each move, by name."""
+    """Return a row for each named move."""
     return tuple(_row(name, move) for name, move in moves.items())
 
 
 def profile_markdown(rows: Sequence[ProfileRow]) -> str:
-    """The rows as a table in Markdown."""
+    """Return the rows as a Markdown table."""
     return "\n".join(table(HEADER, map(cells, rows))) + "\n"
 
 
 def cells(row: ProfileRow) -> tuple[str, ...]:
-    """A row for people, under HEADER."""
+    """Return a row as text, in the columns of HEADER."""
 
     def shown(ratio: float | None) -> str:
         return "-" if ratio is None else f"{ratio:.3f}"
@@ -122,7 +132,7 @@ def _row(name: str, move: Move) -> ProfileRow:
 
 
 def _continuous(move: Move, part: int) -> bool:
-    """Whether the acceleration of a part neither jumps on the way nor at its ends."""
+    """Return whether the acceleration of a part is continuous and zero at both ends."""
     motion = move.motions[part]
     inner = np.asarray(motion.law.s.x)[1:-1]
     before, after = (motion(inner + side * 1e-9 * motion.duration)[2] for side in (-1.0, 1.0))

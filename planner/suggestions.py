@@ -1,4 +1,4 @@
-"""What would make a move possible: the smallest single change of each kind, verified by planning again."""
+"""Smallest single changes that make a move possible, each verified by planning again."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ import numpy as np
 
 from boom_model import JOINTS, Boom, Drive, InfeasibleError
 from planner.bisection import bisect
-from planner.checks.certificate import certified
+from planner.checks.certificate import certificate_of
 from planner.checks.evaluation import evaluate
 from planner.checks.motion_checks import check_rows
 from planner.checks.rows import Verdict, overall
@@ -17,10 +17,10 @@ from planner.paths.targets import resolve
 from planner.planning import plan_motion
 from planner.progress import Track
 
-_MOST = 4.0
-"""The largest factor on a duration, a ratio or a drive that is tried."""
+_MAX_FACTOR = 4.0
+"""Largest factor tried on a gear ratio, a drive or limits."""
 
-_COARSE = 0.05  # [s], the sampling step of a trial
+_TRIAL_STEP = 0.05  # [s], sampling step of a trial
 _BISECTIONS = 8
 
 Change = Callable[[Boom, Sequence[int], float], Boom]
@@ -28,26 +28,39 @@ Change = Callable[[Boom, Sequence[int], float], Boom]
 
 @dataclass(frozen=True)
 class Suggestion:
-    """One change that makes the move possible, all else the same."""
+    """Single change that makes the move possible with everything else unchanged."""
 
     change: str
-    """payload, duration, ratio, drive, limit or order."""
+    """Kind of change: payload, duration, ratio, drive, limit or order."""
     sentence: str
+    """Change in words, with its value."""
 
 
 def suggestions(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[Suggestion, ...]:
-    """The least change of each kind with which `plan_move(boom, spec)` succeeds and no check FAILs.
+    """Find the least change of each kind with which a move can be planned and no check FAILs.
 
-    Payload (less), duration (longer), the gear ratio of one joint (higher, all else of the sheet unchanged), the drive of one
-    joint (its torques scaled), one joint's velocity, acceleration and jerk limits (higher; these three at all joints where
-    no single one helps), and the order of the joints (the extension first, or last). Factors are looked for up to 4 and
-    rounded to the safe side; each is planned with before it is offered. Empty where no single change helps, and where nothing
-    is wrong.
+    The kinds are:
+
+    - a smaller payload
+    - a longer duration
+    - a higher gear ratio at one joint, with the other figures of its datasheet unchanged
+    - a stronger drive at one joint, with its torques scaled
+    - higher velocity, acceleration and jerk limits of one joint
+    - another order of the joints: the extension first or last
+
+    If no single joint helps, gear ratio, drive and limits are changed at all joints together.
+    Factors are searched up to 4 and rounded to the safe side. Each suggestion is verified by
+    planning with it. The result is empty if no single change helps or if nothing is wrong.
 
     Args:
-        track: iterates over the kinds of change, and may show how far it is.
+        boom: the boom.
+        spec: the move.
+        track: iterates over the kinds of change, and may show progress.
+
+    Raises:
+        InputError: as `plan_move`.
     """
-    spec = replace(spec, step=_COARSE, rate=None)
+    spec = replace(spec, step=_TRIAL_STEP, rate=None)
     if works(boom, spec):
         return ()
     driven = [i for i, drive in enumerate(boom.drives) if drive is not None]
@@ -63,14 +76,14 @@ def suggestions(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[Sugges
 
 
 def works(boom: Boom, spec: MoveSpec) -> bool:
-    """Whether a move can be planned and no check FAILs."""
+    """Return whether a move can be planned and no check FAILs."""
     try:
         planned = plan_motion(boom, spec)
     except InfeasibleError:
         return False
     reactions = boom.mount.force is not None or boom.mount.moment is not None
     evaluation = evaluate(boom, planned, vehicle=spec.vehicle, reactions=reactions)
-    certificate = certified(evaluation)
+    certificate = certificate_of(evaluation)
     if certificate is not None and certificate.broken:
         return False
     return overall(check_rows(evaluation)) is not Verdict.FAIL
@@ -102,7 +115,7 @@ def _duration(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
 
 
 def _scaled(boom: Boom, spec: MoveSpec, kind: str, change: Change, joints: Sequence[int]) -> Iterator[Suggestion]:
-    """The least factor at each joint by itself or, where none helps, at all of them."""
+    """Yield the least factor for each single joint or, if none helps, for all joints together."""
     found = False
     for which in ([i] for i in joints):
         factor = _least_factor(spec, partial(change, boom, which))
@@ -117,8 +130,8 @@ def _scaled(boom: Boom, spec: MoveSpec, kind: str, change: Change, joints: Seque
 
 
 _SENTENCES = {
-    "ratio": "gear ratio at {joints} {factor:.3g} times as high, with the other figures of the gearbox's sheet",
-    "drive": "motor and gearbox at {joints} with {factor:.3g} times the torque, and no heavier",
+    "ratio": "gear ratio of {joints} {factor:.3g} times as high, with the gearbox otherwise unchanged",
+    "drive": "motor and gearbox of {joints} with {factor:.3g} times the torque and the same mass",
     "limit": "velocity, acceleration and jerk limits of {joints} {factor:.3g} times as high",
 }
 
@@ -170,18 +183,21 @@ def _orders(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
         between = moved_from.copy()
         between[3] = moved_to[3]
         if boom.limits.contain(between) and works(boom, replace(spec, via=(between,))):
-            yield Suggestion("order", f"the extension {name}, by itself")
+            yield Suggestion("order", f"move the extension {name}, separately")
 
 
 def _least_factor(spec: MoveSpec, changed: Callable[[float], Boom]) -> float | None:
-    """The least factor up to _MOST that works, rounded up to a hundredth; None where that does not."""
+    """Return the least factor that works, rounded up to a hundredth.
+
+    None if no factor up to _MAX_FACTOR works, or if the rounded one does not.
+    """
 
     def helps(factor: float) -> bool:
         return works(changed(factor), spec)
 
-    if not helps(_MOST):
+    if not helps(_MAX_FACTOR):
         return None
-    rounded = float(np.ceil(bisect(helps, good=_MOST, bad=1.0, steps=_BISECTIONS, geometric=True) * 100.0) / 100.0)
+    rounded = float(np.ceil(bisect(helps, good=_MAX_FACTOR, bad=1.0, steps=_BISECTIONS, geometric=True) * 100.0) / 100.0)
     return rounded if helps(rounded) else None
 
 

@@ -13,8 +13,8 @@ from boom_model import (
     ActuatorAngle,
     BaseMotion,
     Boom,
+    Constraint,
     FixedExtension,
-    Hold,
     LargestMargin,
     LeastExtension,
     LeastTorque,
@@ -23,9 +23,11 @@ from boom_model import (
     up_on_slope,
 )
 from boom_model.arrays import Array
-from planner import Motion, Profile, TipTarget
+from planner import TipTarget
 from planner.paths.legs import Along, legs
 from planner.paths.targets import Target
+from planner.timing.profile import Profile
+from planner.timing.time_law import Motion
 from planner.timing.timing import Timing, timed
 
 BOOM = Boom.load()
@@ -45,7 +47,7 @@ class RandomPlan:
     boom: Boom
     targets: tuple[Target, ...]
     pitch: float
-    hold: Hold
+    constraint: Constraint
     along: Along
     stops: bool
     base: BaseMotion | None
@@ -55,7 +57,7 @@ class RandomPlan:
 
     @property
     def chooses(self) -> bool:
-        return isinstance(self.hold, CHOICES)
+        return self.constraint in CHOICES
 
     def motions(self) -> tuple[Motion, ...]:
         """The motions of the plan, without any check.
@@ -64,7 +66,7 @@ class RandomPlan:
             BoomError: the plan is refused.
         """
         timing = Timing.of(self.profile, **self.options)
-        paths, _ = legs(self.boom, self.targets, self.pitch, self.hold, self.along, self.stops)
+        paths, _ = legs(self.boom, self.targets, self.pitch, self.constraint, self.along, self.stops)
         return timed(self.boom, paths, timing, self.base) if paths else ()
 
 
@@ -101,7 +103,7 @@ def _size(rng: Generator) -> float:
 def _pose(rng: Generator) -> Array:
     while True:
         q = rng.uniform(LIMITS.lower, LIMITS.upper)
-        if LIMITS.hold(q):
+        if LIMITS.contain(q):
             return q
 
 
@@ -111,11 +113,11 @@ def _poses(rng: Generator, count: int) -> list[Array]:
     for _ in range(count):
         moves = (rng.random(5) < 0.8) * _size(rng)
         q = first + moves * (_pose(rng) - first)
-        found.append(q if LIMITS.hold(q) else first + moves.max() * (_pose(rng) - first))
+        found.append(q if LIMITS.contain(q) else first + moves.max() * (_pose(rng) - first))
     return [first, *found[1:]]
 
 
-def _on_a_curve(rng: Generator, chooses: bool) -> tuple[tuple[Target, ...], float, Hold, Along]:
+def _on_a_curve(rng: Generator, chooses: bool) -> tuple[tuple[Target, ...], float, Constraint, Along]:
     """Targets, pitch, constraint and line or arc: its ends are tips of poses with the pitch and the constraint."""
     start = _pose(rng)
     fixed = int(rng.choice([2, 3]))  # the lower link or the extension
@@ -125,17 +127,17 @@ def _on_a_curve(rng: Generator, chooses: bool) -> tuple[tuple[Target, ...], floa
         if not chooses:
             q[fixed] = start[fixed]
         q[4] = start[2] + start[4] - q[2]  # the same pitch
-        if LIMITS.hold(q):
+        if LIMITS.contain(q):
             poses.append(q)
     tips = forward_kinematics(BOOM, np.array(poses))
     pitch = float(tips.pitch[0])
-    hold: Hold = ActuatorAngle(float(start[2] - np.pi)) if fixed == 2 else FixedExtension(float(start[3]))
+    constraint: Constraint = ActuatorAngle(float(start[2] - np.pi)) if fixed == 2 else FixedExtension(float(start[3]))
     if chooses:
-        hold = CHOICES[rng.integers(len(CHOICES))]
+        constraint = CHOICES[rng.integers(len(CHOICES))]
     a, b = tips.position
     targets = tuple(TipTarget(tuple(place.tolist())) for place in (a, b))
     if rng.random() < 0.7:
-        return targets, pitch, hold, "line"
+        return targets, pitch, constraint, "line"
     aside = np.cross(rng.normal(size=3), b - a)
     aside *= np.linalg.norm(b - a) / max(float(np.linalg.norm(aside)), 1e-30)
-    return targets, pitch, hold, (a + b) / 2.0 + rng.uniform(0.05, 0.6) * aside
+    return targets, pitch, constraint, (a + b) / 2.0 + rng.uniform(0.05, 0.6) * aside

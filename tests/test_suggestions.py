@@ -100,7 +100,7 @@ def test_an_order_that_mends_an_overload_really_does():
     raised[3], run_out[3] = start[3], goal[3]
     boom = BOOM.with_payload(30.0)
     found = by_kind(suggestions(boom, MoveSpec.of(start, goal, profile="time-optimal")))
-    assert found["order"] == ["the extension last, by itself"]
+    assert found["order"] == ["move the extension last, separately"]
     assert not works(boom, start, goal, profile="time-optimal")
     assert works(boom, start, goal, profile="time-optimal", via=[raised])
     assert not works(boom, start, goal, profile="time-optimal", via=[run_out])

@@ -1,4 +1,7 @@
-"""The catalogue of motors, gearboxes and linear actuators: a TOML file in the datasheets' units, read into SI."""
+"""Catalogue of motors, gearboxes and linear actuators.
+
+It is a TOML file in the units of the datasheets; loading converts them to SI.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -57,10 +60,10 @@ class Catalogue:
 
     @staticmethod
     def load(path: str | Path | None = None) -> "Catalogue":
-        """The shipped catalogue (thesis, Appendix E), or one of the same form.
+        """Return the shipped catalogue (thesis, Appendix E), or another file of the same form.
 
         Raises:
-            InputError: the file cannot be read, or breaks the form; names the file and the key.
+            InputError: the file cannot be read or is malformed; the message names file and key.
         """
         table = read_toml(Path(path) if path is not None else CATALOGUE_FILE, _CatalogueTable)
         return Catalogue(
@@ -70,10 +73,11 @@ class Catalogue:
         )
 
     def with_file(self, path: str | Path | None) -> "Catalogue":
-        """This catalogue and the entries of another file; None adds nothing.
+        """Return this catalogue with the entries of another file added; None adds nothing.
 
         Raises:
-            InputError: as `load`, or an entry of the file bears a name that is taken; names the file and the entry.
+            InputError: as `load`, or an entry of the file has a name that the catalogue already
+                has; the message names file and entry.
         """
         if path is None:
             return self
@@ -81,7 +85,7 @@ class Catalogue:
         for field in fields(self):
             for name in getattr(own, field.name):
                 if name in getattr(self, field.name):
-                    raise InputError(f"{path}: key {field.name}.{name}: the name is taken by an entry that is known already")
+                    raise InputError(f"{path}: key {field.name}.{name}: the catalogue already has an entry of this name")
         return Catalogue(**{f.name: MappingProxyType({**getattr(self, f.name), **getattr(own, f.name)}) for f in fields(self)})
 
 
@@ -93,7 +97,11 @@ class _WindingTable(Table):
 
 
 class _MotorTable(Table):
-    """What no check uses (phase voltage, temperatures, shaft loads) stands in the file for its readers."""
+    """Table of a motor.
+
+    No check uses the phase voltage, the temperatures and the shaft loads; they are in the file for
+    its readers.
+    """
 
     source: _Text
     tolerance_percent: Annotated[float, PERCENT] | None = None
@@ -119,7 +127,7 @@ class _MotorTable(Table):
 
 
 _RATINGS = ("max_average_torque_Nm", "start_stop_torque_Nm", "peak_torque_Nm")
-"""Of a gearbox, none less than the one before."""
+"""Torque ratings of a gearbox in ascending order."""
 
 
 class _GearboxTable(Table):

@@ -1,0 +1,1 @@
+"""Dynamics of the boom: inverse dynamics, equations of motion and the base's motion."""

@@ -1,4 +1,4 @@
-"""How the vehicle moves the boom's base."""
+"""Motion of the boom's base, as the vehicle imposes it."""
 
 from dataclasses import dataclass
 
@@ -13,18 +13,21 @@ _UP = (0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class BaseMotion:
-    """Motion of frame 1 over the ground, each (..., 3) along the axes of frame 1, constant or a time series."""
+    """Motion of frame 1 over the ground.
+
+    Each array is (..., 3) along the axes of frame 1, constant or a time series.
+    """
 
     velocity: Array
-    """[m/s]; enters velocities only, not loads"""
+    """[m/s]; affects velocities only, not loads"""
     angular_velocity: Array
     """[rad/s]"""
     acceleration: Array
-    """[m/s^2], gravity not counted"""
+    """[m/s^2], without gravity"""
     angular_acceleration: Array
     """[rad/s^2]"""
     up: Array
-    """Unit vector against gravity: (0, 0, 1) on level ground."""
+    """Unit vector opposite to gravity: (0, 0, 1) on level ground."""
 
     @staticmethod
     def of(
@@ -34,10 +37,10 @@ class BaseMotion:
         angular_acceleration: ArrayLike = (0.0, 0.0, 0.0),
         up: ArrayLike = _UP,
     ) -> "BaseMotion":
-        """A base motion from arrays, checked; `up` is scaled to length 1.
+        """Return a base motion from arrays, after checking them. `up` is scaled to length 1.
 
         Raises:
-            InputError: not finite or not (..., 3), or `up` is zero.
+            InputError: an array is not finite or not (..., 3), or `up` is zero.
         """
         given = {
             "velocity": velocity,
@@ -55,9 +58,15 @@ class BaseMotion:
 
 
 def up_on_slope(roll: ArrayLike, pitch: ArrayLike) -> Array:
-    """`up` (..., 3) of a base rolled about its forward axis, then pitched nose-down about its left one [rad].
+    """Return `up` (..., 3) of a base on a slope, given its roll and pitch [rad].
 
-    R_ground_base = R_y(pitch) R_x(roll): up = (-sin(pitch), cos(pitch) sin(roll), cos(pitch) cos(roll)).
+    Roll is about the base's forward axis. Pitch is about its left axis, positive with the nose
+    down. With R_ground_base = R_y(pitch) R_x(roll),
+
+        up = (-sin(pitch), cos(pitch) sin(roll), cos(pitch) cos(roll)).
+
+    Raises:
+        InputError: roll or pitch is not finite.
     """
     roll, pitch = np.broadcast_arrays(checked("roll", roll), checked("pitch", pitch))
     return np.stack([-np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)], axis=-1)

@@ -1,7 +1,7 @@
-"""The structure of the dynamics: M(q) qdd + C(q, qd) qd + g(q) = tau, and what follows from it.
+"""Equations of motion, M(q) qdd + C(q, qd) qd + g(q) = tau, and energies.
 
-Torques are `inverse_dynamics` at a state that leaves only that term. The mass matrix, and with it forward dynamics, comes
-from the same regrouped masses by `closed_form`.
+Torques are `inverse_dynamics` at a state where the other terms vanish. The mass matrix and forward
+dynamics come from `closed_form`, which uses the same regrouped masses.
 """
 
 import numpy as np
@@ -20,7 +20,10 @@ _CHUNK = 1280
 
 
 def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Array:
-    """M(q) (..., 5, 5): torque per joint acceleration, payload as mass; with the drives' reflected inertia where asked.
+    """Return the mass matrix M(q) (..., 5, 5): joint torque per joint acceleration.
+
+    The payload counts as a mass. With `drive_inertia`, the reflected inertia of the drives is added
+    to the diagonal.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -39,7 +42,7 @@ def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Arr
 def mass_matrix_and_bias(
     boom: Boom, q: ArrayLike, qd: ArrayLike, *, base: BaseMotion | None = None, tip_force: ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """M(q) (..., 5, 5) and the torque (..., 5) that a motion without joint acceleration needs, C(q, qd) qd + g(q).
+    """Return M(q) (..., 5, 5) and the torque C(q, qd) qd + g(q) (..., 5) at zero joint acceleration.
 
     The same as `mass_matrix` and `inverse_dynamics` with qdd = 0, at a fraction of the time on small batches.
 
@@ -70,7 +73,7 @@ def mass_matrix_and_bias(
 
 
 def velocity_torque(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
-    """C(q, qd) qd (..., 5): Coriolis and centrifugal torque.
+    """Return the Coriolis and centrifugal torque C(q, qd) qd (..., 5).
 
     Raises:
         InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
@@ -79,7 +82,9 @@ def velocity_torque(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
 
 
 def gravity_torque(boom: Boom, q: ArrayLike, *, base: BaseMotion | None = None) -> Array:
-    """g(q) (..., 5): torque that holds the joints still, against gravity and whatever `base` does besides.
+    """Return the static torque g(q) (..., 5) that keeps the joints at rest.
+
+    It balances gravity and, where `base` is given, the tilt and motion of the base.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -97,11 +102,13 @@ def forward_dynamics(
     friction: bool = False,
     drive_inertia: bool = False,
 ) -> Array:
-    """Joint accelerations (..., 5) under joint torques: qdd = M^-1 (tau - inverse_dynamics(q, qd, 0)).
+    """Return the joint accelerations (..., 5) under joint torques.
 
-    Args:
-        q, qd, tau: (..., 5); they broadcast.
-        base, friction, drive_inertia: as in `inverse_dynamics`. Coulomb friction is 0 at rest: it brakes, and does not stick.
+        qdd = M^-1 (tau - inverse_dynamics(q, qd, 0))
+
+    The arrays q, qd and tau have shape (..., 5) and broadcast. `base` and `friction` act as in
+    `inverse_dynamics`, `drive_inertia` as in `mass_matrix`. Coulomb friction is 0 at rest: it
+    brakes a moving joint, but there is no stiction.
 
     Raises:
         InputError: an input is not finite or of the wrong shape, or shapes do not match.
@@ -116,7 +123,7 @@ def forward_dynamics(
 
 
 def kinetic_energy(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
-    """(1/2) qd . M(q) qd (...) [J], on a base at rest.
+    """Return the kinetic energy (1/2) qd . M(q) qd (...) [J] on a base at rest.
 
     Raises:
         InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
@@ -128,7 +135,9 @@ def kinetic_energy(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
 
 
 def potential_energy(boom: Boom, q: ArrayLike) -> Array:
-    """sum m g z over bodies and payload (...) [J], z above frame 1 on level ground.
+    """Return the potential energy, the sum of m g z over bodies and payload (...) [J].
+
+    The height z is measured from frame 1 on level ground.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -145,5 +154,5 @@ def _drive_inertia(boom: Boom) -> Array:
 
 
 def _falling(boom: Boom) -> BaseMotion:
-    """A base in free fall, where gravity is not felt."""
+    """Return a base in free fall, where gravity has no effect."""
     return BaseMotion.of(acceleration=(0.0, 0.0, -boom.gravity))

@@ -1,4 +1,4 @@
-"""Where a joint's torque comes from."""
+"""Contributions of gravity, inertia, velocity, payload, friction and vehicle to joint torques."""
 
 from dataclasses import dataclass, fields
 
@@ -14,23 +14,26 @@ from boom_model.dynamics.newton_euler import PayloadAs, inverse_dynamics
 
 @dataclass(frozen=True, eq=False)
 class Breakdown:
-    """Parts of the joint torques, each (..., 5) [Nm, the extension's N]; their sum is `inverse_dynamics`'s tau."""
+    """Parts of the joint torques, each (..., 5) [Nm, N for the extension].
+
+    Their sum is `inverse_dynamics(...).tau`.
+    """
 
     gravity: Array
-    """to hold the bodies up, without payload"""
+    """Torque against the weight of the bodies, without payload."""
     inertia: Array
-    """to accelerate the bodies at rest"""
+    """Torque that accelerates the bodies from rest, without payload."""
     velocity: Array
-    """Coriolis and centrifugal torque of the bodies"""
+    """Coriolis and centrifugal torque of the bodies, without payload."""
     payload: Array
-    """all that the payload adds"""
+    """Everything that the payload adds."""
     friction: Array
     vehicle: Array
-    """all that tilt and motion of the base add, with the payload"""
+    """Everything that tilt and motion of the base add, with the payload."""
 
     @property
     def total(self) -> Array:
-        """The sum of the parts."""
+        """Sum of the parts."""
         total: Array = np.sum([getattr(self, field.name) for field in fields(self)], axis=0)
         return total
 
@@ -45,7 +48,7 @@ def breakdown(
     payload_as: PayloadAs = "mass",
     friction: bool = False,
 ) -> Breakdown:
-    """Each joint's torque in parts that add up to `inverse_dynamics` with the same arguments.
+    """Split each joint's torque into parts that add up to `inverse_dynamics` of the same arguments.
 
     Raises:
         InputError: as `inverse_dynamics`.

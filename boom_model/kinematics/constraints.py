@@ -1,7 +1,8 @@
-"""The extra constraint that makes the inverse kinematics determinate.
+"""Extra constraints that make the inverse kinematics determinate.
 
-A position and a pitch fix four of the five joints. A fixing constraint fixes the fifth. A choosing constraint takes, among all
-joint positions within the limits that reach the target, the one with the least cost.
+A position and a pitch of the tip are four conditions on five joints. A fixing constraint adds the
+fifth. A choosing constraint selects the joint position of least cost among all those that reach the
+target within the limits.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, checked, read_only
 from boom_model.boom import Boom
-from boom_model.drives.drive import drive_torque_limit
+from boom_model.drives.limits import static_limits
 from boom_model.dynamics.equations_of_motion import gravity_torque
 from boom_model.errors import InputError
 from boom_model.words import joint_position, number
@@ -20,7 +21,7 @@ from boom_model.words import joint_position, number
 
 @dataclass(frozen=True)
 class ActuatorAngle:
-    """The actuator is held at an elevation above the boom's forward horizontal: theta3 = pi + elevation."""
+    """Actuator at a fixed elevation above the forward horizontal: theta3 = pi + elevation."""
 
     elevation: float
     """[rad]; negative points down."""
@@ -31,7 +32,7 @@ class ActuatorAngle:
 
 @dataclass(frozen=True)
 class ActuatorHorizontal(ActuatorAngle):
-    """The actuator is held horizontal, pointing away from the base: theta3 = pi."""
+    """Horizontal actuator that points away from the base: theta3 = pi."""
 
     elevation: float = 0.0
 
@@ -41,7 +42,7 @@ class ActuatorHorizontal(ActuatorAngle):
 
 @dataclass(frozen=True)
 class FixedExtension:
-    """The actuator's extension is held: theta4 = extension."""
+    """Fixed extension of the actuator: theta4 = extension."""
 
     extension: float
     """[m]"""
@@ -52,7 +53,7 @@ class FixedExtension:
 
 @dataclass(frozen=True)
 class LeastExtension:
-    """The actuator is extended as little as possible. Cost: theta4 [m]."""
+    """Smallest extension of the actuator. Cost: theta4 [m]."""
 
     unit: ClassVar[str] = "m of extension"
 
@@ -60,13 +61,16 @@ class LeastExtension:
         return "least-extension"
 
     def cost(self, boom: Boom, q: Array) -> Array:
-        """(...) of q (..., 5)."""
+        """Return the cost (...) of joint positions q (..., 5)."""
         return q[..., 3]
 
 
 @dataclass(frozen=True)
 class NearestHorizontal:
-    """The actuator is as parallel to the ground as possible. Cost: |theta3 - pi| [rad]; less extension breaks a tie."""
+    """Actuator as close to horizontal as possible.
+
+    Cost: |theta3 - pi| [rad]. Between equal costs, the smaller extension wins.
+    """
 
     unit: ClassVar[str] = "rad of elevation"
 
@@ -74,16 +78,16 @@ class NearestHorizontal:
         return "nearest-horizontal"
 
     def cost(self, boom: Boom, q: Array) -> Array:
-        """(...) of q (..., 5)."""
+        """Return the cost (...) of joint positions q (..., 5)."""
         return np.abs(q[..., 2] - np.pi) + _TIE * q[..., 3]
 
 
 @dataclass(frozen=True)
 class LeastTorque:
-    """The hardest-worked drive holds as little as possible, payload included.
+    """Smallest static load of the most heavily loaded drive, payload included.
 
-    Cost: the largest |static torque| / (what the drive allows at rest) over the joints that have a drive. Joints without one
-    do not count, because nobody knows what they bear.
+    Cost: the largest |static torque| / (torque limit of the drive at rest) over the joints whose
+    drive has a torque limit. Other joints do not count, because their limit is unknown.
     """
 
     unit: ClassVar[str] = "of a drive's allowed torque"
@@ -92,33 +96,35 @@ class LeastTorque:
         return "least-torque"
 
     def cost(self, boom: Boom, q: Array) -> Array:
-        """(...) of q (..., 5).
+        """Return the cost (...) of joint positions q (..., 5).
 
         Raises:
             InputError: no joint has a drive with a torque limit.
         """
-        limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
-        driven = [i for i, limit in enumerate(limits) if limit is not None]
-        if not driven:
-            raise InputError(f"constraint {self}: no joint of {boom.name} has a drive to measure torques by")
-        allowed = np.array([float(limit) for limit in limits if limit is not None])
-        ratio: Array = np.max(np.abs(gravity_torque(boom, q)[..., driven]) / allowed, axis=-1)
+        limits = static_limits(boom)
+        driven = np.isfinite(limits)
+        if not driven.any():
+            raise InputError(f"constraint {self}: no joint of {boom.name} has a drive with a torque limit")
+        ratio: Array = np.max(np.abs(gravity_torque(boom, q)[..., driven]) / limits[driven], axis=-1)
         return ratio
 
 
 @dataclass(frozen=True, eq=False)
 class NearestPose:
-    """Nearest to a joint position. Cost: sum of squares of the joints' distances, each as a share of its range."""
+    """Joint position nearest to a given one.
+
+    Cost: the sum of the squared distances of the joints, each as a share of the joint's range.
+    """
 
     pose: Array
     """(5,)"""
 
     @staticmethod
     def to(q: ArrayLike) -> "NearestPose":
-        """The constraint of a joint position q (5,).
+        """Return the constraint for a joint position q (5,).
 
         Raises:
-            InputError: not finite, or not (5,).
+            InputError: q is not finite or not (5,).
         """
         pose = checked("reference", q, 5)
         if pose.shape != (5,):
@@ -131,16 +137,18 @@ class NearestPose:
         return f"nearest={','.join(f'{x:.6g}' for x in self.pose)} (rad, m)"
 
     def cost(self, boom: Boom, q: Array) -> Array:
-        """(...) of q (..., 5)."""
+        """Return the cost (...) of joint positions q (..., 5)."""
         distance: Array = np.sum(((q - self.pose) / _spans(boom)) ** 2, axis=-1)
         return distance
 
 
 @dataclass(frozen=True)
 class LargestMargin:
-    """Farthest from the nearest joint limit. Cost: minus the least distance to a limit, each as a share of its joint's range.
+    """Largest distance to the nearest joint limit.
 
-    The coupled limit counts with the range of theta3. Joints that target and pitch fix count too: they bound what can be had.
+    Cost: minus the smallest distance to a limit, each as a share of its joint's range. The coupled
+    limit counts with the range of theta3. Joints that the target and the pitch determine count as
+    well, because they bound the margin that is possible.
     """
 
     unit: ClassVar[str] = "of a joint's range"
@@ -149,7 +157,7 @@ class LargestMargin:
         return "largest-margin"
 
     def cost(self, boom: Boom, q: Array) -> Array:
-        """(...) of q (..., 5)."""
+        """Return the cost (...) of joint positions q (..., 5)."""
         spans = _spans(boom)
         excess: Array = np.max(boom.limits.excess(q) / np.array([*spans, spans[2]]), axis=-1)
         return excess
@@ -157,9 +165,10 @@ class LargestMargin:
 
 @dataclass(frozen=True)
 class LeastTime:
-    """Travel a line or an arc of the tip in the least time. Cost: the time under joint limits and drive torque at standstill.
+    """Shortest travel time along a line or an arc of the tip.
 
-    The choice is made for the whole curve; a single target has no time.
+    Cost: the travel time within the joint limits and the drives' torque limits at standstill. The
+    choice is made for the whole curve; a single target has no travel time.
     """
 
     unit: ClassVar[str] = "s"
@@ -168,15 +177,15 @@ class LeastTime:
         return "least-time"
 
     def cost(self, boom: Boom, q: Array) -> Array:
-        """Raise InputError: a joint position alone has no time.
+        """Raise InputError, because a joint position alone has no travel time.
 
         Raises:
             InputError: always.
         """
-        raise InputError(f"constraint {self} chooses along a line or an arc of the tip; a single target has no time")
+        raise InputError(f"constraint {self} needs a line or an arc of the tip; a single target has no travel time")
 
 
-_TIE = 1e-9  # [rad/m] above rounding, and below what anybody can measure
+_TIE = 1e-9  # [rad/m] above rounding error and below any measurable effect
 
 FixingConstraint = ActuatorAngle | FixedExtension
 ChoosingConstraint = LeastExtension | NearestHorizontal | LeastTorque | NearestPose | LargestMargin | LeastTime
@@ -184,7 +193,10 @@ Constraint = FixingConstraint | ChoosingConstraint
 
 
 def measure(boom: Boom, constraint: Constraint, reference: ArrayLike | None = None) -> ChoosingConstraint:
-    """Return what the best branch has least of: a choosing constraint's own cost, else the distance to a reference pose.
+    """Return the constraint whose cost is least at the best branch.
+
+    That is a choosing constraint itself. For a fixing constraint it is the distance to `reference`,
+    (5,), or to the middle of the joint ranges where that is None.
 
     Raises:
         InputError: reference is not finite or not (5,).
@@ -214,10 +226,12 @@ CONSTRAINTS = f"{', '.join(WORDS)}, actuator=DEG, extension=M, nearest=DEG,DEG,D
 
 
 def parse_constraint(text: str) -> Constraint:
-    """Return a constraint from its word; `actuator=DEG` is the actuator's elevation above the horizontal.
+    """Return the constraint that a word stands for.
+
+    In `actuator=DEG`, DEG is the actuator's elevation above the horizontal.
 
     Raises:
-        InputError: no such constraint, or its value is not a finite number.
+        InputError: the constraint is unknown, or its value is not a finite number.
     """
     kind, equals, rest = text.partition("=")
     if text in WORDS:

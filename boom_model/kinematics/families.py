@@ -1,14 +1,20 @@
-"""All joint positions that put the tip at a target with a pitch, and the best of them under a constraint that chooses.
+"""Family of joint positions that reach a target, and its best member under a choosing constraint.
 
-They are a one-parameter family, and theta2 is its parameter. With W = (F, G) of `closure` and V = W - L9 e(theta2),
+At a given tip position and pitch the arm has a self-motion of one parameter, theta2.
+With W = (F, G) of `closure` and V = W - L9 e(theta2),
 
     rho = sqrt(|V|^2 - L6^2),   theta3 = angle(-V) - atan2(L6, rho),   theta5 = phi - theta3.
 
-Where a limit is met, theta2 has a closed form: extension and actuator's angle held there (inverse kinematics), or the angle
-delta between lower and inner link (the coupled limit), by |W|^2 = (L9 - rho cos(delta) + L6 sin(delta))^2 + (rho sin(delta) +
-L6 cos(delta))^2. Between two such points the family is within the limits or outside as a whole, so that the feasible
-intervals are exact. A cost is least at one of their ends, at a stationary point in closed form, or at a minimum found by a
-scan of the whole interval and refined.
+The values of theta2 at which a limit is reached have a closed form. For limits of the extension and
+of the actuator's angle it is that of the inverse kinematics. For the coupled limit, on the angle
+delta between lower and inner link, it follows from
+
+    |W|^2 = (L9 - rho cos(delta) + L6 sin(delta))^2 + (rho sin(delta) + L6 cos(delta))^2.
+
+Between two neighbouring values the family is either entirely within the limits or entirely outside,
+so the feasible intervals are exact. The least cost is at an end of an interval, at a stationary
+point in closed form, or at a minimum that a scan of the whole interval finds and golden section
+refines.
 """
 
 from typing import NamedTuple
@@ -17,16 +23,16 @@ import numpy as np
 
 from boom_model.arrays import Array, Mask
 from boom_model.boom import Boom
+from boom_model.golden_section import golden_section
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension, turned_into_limits
 from boom_model.kinematics.constraints import ChoosingConstraint, LeastExtension, NearestHorizontal
 
 _SCAN = 64
 _REFINEMENTS = 60
-_SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 class Targets(NamedTuple):
-    """Targets with a side of the base each, all of shape (n,)."""
+    """Targets, each with its side of the base; all arrays have shape (n,)."""
 
     theta1: Array
     F: Array
@@ -34,8 +40,29 @@ class Targets(NamedTuple):
     phi: Array
 
 
+def targets_at(boom: Boom, position: Array, pitch: Array | float, side: Array | float) -> Targets:
+    """Return the targets of tip positions (..., 3) at pitches (...), on a side of the base.
+
+    Args:
+        boom: the boom.
+        position: of the tip in frame 1 [m].
+        pitch: [rad]
+        side: 1 where the yaw points towards the tip, -1 where the arm reaches over the base; it broadcasts.
+    """
+    g = boom.geometry
+    x, y, z = np.moveaxis(position, -1, 0)
+    F = side * np.hypot(x, y) - g.L2 - g.L8 * np.cos(pitch)
+    G = z - g.L1 - g.L8 * np.sin(pitch)
+    theta1 = np.arctan2(y, x) + np.where(np.asarray(side) < 0.0, np.pi, 0.0)
+    theta1, G, phi = (np.broadcast_to(each, F.shape) for each in (theta1, G, np.asarray(pitch) - np.pi / 2.0))
+    return Targets(theta1, F, G, phi)
+
+
 def member(boom: Boom, targets: Targets, theta2: Array) -> Array:
-    """The family's joint positions (n, k, 5) at theta2 (n, k); NaN where the actuator cannot close the loop."""
+    """Return the family's joint positions (n, k, 5) at theta2 (n, k).
+
+    They are NaN where the actuator cannot close the loop.
+    """
     g = boom.geometry
     theta1, F, G, phi = (x[:, None] for x in targets)
     x, z = F - g.L9 * np.cos(theta2), G - g.L9 * np.sin(theta2)
@@ -47,11 +74,11 @@ def member(boom: Boom, targets: Targets, theta2: Array) -> Array:
 
 
 def best_member(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> tuple[Array, Mask]:
-    """The member within the limits with the least cost, (n, 5), and whether there is one, (n,)."""
+    """Return the member of least cost within the limits (n, 5), and whether there is one (n,)."""
     ends = _ends(boom, targets, constraint)
     at_ends = member(boom, targets, ends)
     best, cost = _least(boom, constraint, at_ends, ends)
-    if not isinstance(constraint, LeastExtension | NearestHorizontal):  # theirs are among the ends
+    if not isinstance(constraint, LeastExtension | NearestHorizontal):  # their minimum is at an end
         best, cost = _inside(boom, targets, constraint, ends, best, cost)
     exists = np.isfinite(cost)
     q = member(boom, targets, best[:, None])[:, 0]
@@ -60,7 +87,11 @@ def best_member(boom: Boom, targets: Targets, constraint: ChoosingConstraint) ->
 
 
 def _ends(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> Array:
-    """theta2 (n, k) in order, within its own limits: wherever a limit is met, and where a closed cost is stationary."""
+    """Return candidate values of theta2 (n, k) within its own limits, in increasing order.
+
+    They are the values at which a limit is reached, and the stationary points of costs that have a
+    closed form.
+    """
     limits, g = boom.limits, boom.geometry
     _, F, G, phi = targets
     lower, upper = limits.lower, limits.upper
@@ -68,10 +99,10 @@ def _ends(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> Array
     deltas = [limits.linkage]
     points = [np.full_like(F, lower[1]), np.full_like(F, upper[1])]
     if isinstance(constraint, LeastExtension):
-        points.append(np.arctan2(G, F))  # the inner link towards the wrist
+        points.append(np.arctan2(G, F))  # the inner link points at the wrist
     if isinstance(constraint, NearestHorizontal):
         angles.append(np.full_like(F, np.pi))
-        deltas += [np.pi / 2.0, -np.pi / 2.0]  # where theta3 turns round
+        deltas += [np.pi / 2.0, -np.pi / 2.0]  # theta3 is stationary there
     for root in (1.0, -1.0):
         for rho in (g.L7 + lower[3], g.L7 + upper[3]):
             points.append(closed_by_extension(boom, np.full_like(F, rho), F, G, root).theta2)
@@ -84,7 +115,7 @@ def _ends(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> Array
 
 
 def _at_linkage_angle(boom: Boom, F: Array, G: Array, delta: float, root: float) -> Array:
-    """theta2 where theta3 - theta2 = delta; NaN where it never is."""
+    """Return theta2 at which theta3 - theta2 = delta; NaN if there is no such value."""
     g = boom.geometry
     c, s = np.cos(delta), np.sin(delta)
     room = (g.L9 * c) ** 2 - (g.L9**2 + g.L6**2 + 2.0 * g.L9 * g.L6 * s - F**2 - G**2)
@@ -94,7 +125,10 @@ def _at_linkage_angle(boom: Boom, F: Array, G: Array, delta: float, root: float)
 
 
 def _least(boom: Boom, constraint: ChoosingConstraint, q: Array, theta2: Array) -> tuple[Array, Array]:
-    """theta2 and cost (n,) of the cheapest of members (n, k, 5) within the limits; infinite where there is none."""
+    """Return theta2 and cost (n,) of the cheapest of members (n, k, 5) within the limits.
+
+    The cost is infinite where no member is within the limits.
+    """
     cost = _cost(boom, constraint, q)
     at = np.argmin(cost, axis=-1)[:, None]
     return np.take_along_axis(theta2, at, axis=-1)[:, 0], np.take_along_axis(cost, at, axis=-1)[:, 0]
@@ -110,7 +144,7 @@ def _cost(boom: Boom, constraint: ChoosingConstraint, q: Array) -> Array:
 def _inside(
     boom: Boom, targets: Targets, constraint: ChoosingConstraint, ends: Array, best: Array, cost: Array
 ) -> tuple[Array, Array]:
-    """The better of what the ends gave and the least cost inside each feasible interval."""
+    """Return theta2 and cost (n,) of the best member, inside a feasible interval or at its end."""
     middles = (ends[:, 1:] + ends[:, :-1]) / 2.0
     feasible = np.isfinite(_cost(boom, constraint, member(boom, targets, middles))) & (np.diff(ends, axis=-1) > 1e-9)
     row, interval = np.nonzero(feasible)
@@ -122,15 +156,13 @@ def _inside(
     costs = _cost(boom, constraint, member(boom, theirs, scan))
     at = np.clip(np.argmin(costs, axis=-1), 1, _SCAN - 1)
     pick = np.arange(row.size)
-    a, b = scan[pick, at - 1], scan[pick, at + 1]
-    for _ in range(_REFINEMENTS):  # golden section, on all intervals at once
-        c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
-        values = _cost(boom, constraint, member(boom, theirs, np.stack([c, d], axis=-1)))
-        left = values[:, 0] <= values[:, 1]
-        a, b = np.where(left, a, c), np.where(left, d, b)
-    found = ((a + b) / 2.0)[:, None]
-    values = _cost(boom, constraint, member(boom, theirs, found))[:, 0]
-    order = np.argsort(values)[::-1]  # the least of a row is written last
+
+    def costs_at(theta2: Array) -> Array:
+        return _cost(boom, constraint, member(boom, theirs, theta2))
+
+    found = golden_section(costs_at, scan[pick, at - 1], scan[pick, at + 1], _REFINEMENTS)[:, None]
+    values = costs_at(found)[:, 0]
+    order = np.argsort(values)[::-1]  # the least cost of a row is written last
     better = order[values[order] < cost[row[order]]]
     best, cost = best.copy(), cost.copy()
     best[row[better]], cost[row[better]] = found[better, 0], values[better]

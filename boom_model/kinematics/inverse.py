@@ -1,4 +1,4 @@
-"""Inverse kinematics in closed form: a tip position, a pitch and a constraint give every branch."""
+"""Closed-form inverse kinematics: every branch for a tip position, a pitch and a constraint."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,10 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.boom import JOINTS, Boom
-from boom_model.drives.drive import drive_torque_limit
+from boom_model.drives.limits import static_limits
 from boom_model.dynamics.equations_of_motion import gravity_torque
 from boom_model.errors import InfeasibleError, InputError
+from boom_model.golden_section import golden_section
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension, turned_into_limits
 from boom_model.kinematics.constraints import (
     ChoosingConstraint,
@@ -20,26 +21,28 @@ from boom_model.kinematics.constraints import (
     measure,
     parse_constraint,
 )
-from boom_model.kinematics.families import Targets, best_member
+from boom_model.kinematics.families import Targets, best_member, targets_at
 
 _PITCHES = 360
 _REFINEMENTS = 40
-_SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
-_CHUNK = 20_000  # targets at once under a choosing constraint, whose scan takes some 10 kB a target
+_CHUNK = 20_000  # targets at once under a choosing constraint; its scan needs some 10 kB per target
 
 
 @dataclass(frozen=True, eq=False)
 class Branches:
-    """Every branch for a batch of targets, in the last branch axis.
+    """Every branch for a batch of targets.
 
-    A fixing constraint has four: two of the base times two of the closure. A choosing constraint has two, of the base: the best
-    joint position within the limits on either side.
+    A fixing constraint has four branches: two of the base times two of the closure. A choosing
+    constraint has two branches, one on either side of the base, each the best joint position within
+    the limits there.
     """
 
     q: Array
-    """(..., 4 or 2, 5); NaN where the branch does not exist. Yaw, lower and wrist are wrapped into their limits if they can."""
+    """(..., 4 or 2, 5); NaN where the branch does not exist. Yaw, lower and wrist are turned into
+    their limits by whole turns where that is possible."""
     exists: Mask
-    """(..., 4 or 2). A double root, and the second base branch of a target on the yaw axis, count once."""
+    """(..., 4 or 2). A double root counts once. So does a target on the yaw axis, where both base
+    branches coincide."""
     within_limits: Mask
     """(..., 4 or 2)"""
 
@@ -52,19 +55,21 @@ class Solution:
     """(5,)"""
     within_limits: bool
     reasons: tuple[str, ...]
-    """Each position limit that it breaks and by how much; each drive that cannot hold its load there, payload included; and
-    what was chosen where the target leaves a joint free. Drives do not count in `within_limits`."""
+    """Position limits that are exceeded, with the excess; drives that cannot hold the static load,
+    payload included; and the value chosen for a joint that the target leaves free. Overloaded
+    drives do not affect `within_limits`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solutions:
-    """Every branch of one target, and the best of them."""
+    """Every branch of one target, and the best branch."""
 
     solutions: tuple[Solution, ...]
     best: int | None
-    """Index of the branch within the limits that is nearest to the reference, or has the least cost; None without one."""
+    """Index of the best branch within the limits: the nearest to the reference or, with a choosing
+    constraint, the one of least cost. None if no branch is within the limits."""
     pitch: float
-    """[rad]; the one chosen where it was left free. One of more than a turn is given without its whole turns."""
+    """[rad]; the chosen one where it was left free. Whole turns are removed from a given pitch."""
 
 
 def inverse_kinematics(
@@ -74,18 +79,24 @@ def inverse_kinematics(
     constraint: Constraint | str = "horizontal",
     reference: ArrayLike | None = None,
 ) -> Solutions:
-    """Every branch that puts the tip at a position with a pitch, under a constraint.
+    """Return every branch that puts the tip at a position with a pitch, under a constraint.
+
+    An unreachable target is not an error; it has no solutions.
 
     Args:
-        position: (3,) of the tip in frame 1 [m].
-        pitch: elevation of the end effector above the boom's own forward horizontal [rad]; -pi/2 faces down. None leaves it
-            free: a choosing constraint takes the pitch of least cost, a fixing one that of the largest margin to the limits.
-        constraint: the extra constraint, or its word ("horizontal", "extension=0.25", "least-torque", ...).
-        reference: (5,) joint position that the best branch is nearest to, the distance of each joint measured as a share of
-            its range; None is the middle of the ranges. A choosing constraint has its own measure, its cost.
+        boom: the boom.
+        position: (3,) position of the tip in frame 1 [m].
+        pitch: elevation of the end effector above the boom's forward horizontal [rad]; -pi/2 points
+            down. None leaves it free: a choosing constraint takes the pitch of least cost, a fixing
+            constraint the pitch with the largest margin to the limits.
+        constraint: the extra constraint, or its word ("horizontal", "extension=0.25",
+            "least-torque", ...).
+        reference: (5,) joint position; the best branch is the one nearest to it, with the distance
+            of each joint as a share of its range. None is the middle of the ranges. A choosing
+            constraint ignores it and compares costs.
 
     Raises:
-        InputError: an input is not finite or of the wrong shape. An unreachable target is no error: no solutions.
+        InputError: an input is not finite or has the wrong shape.
 
     >>> found = inverse_kinematics(Boom.load(), (1.4, 0.0, 1.0))
     >>> len(found.solutions), [round(float(x), 3) for x in found.solutions[found.best].q]
@@ -95,7 +106,7 @@ def inverse_kinematics(
     position = checked("position", position)
     if position.shape != (3,):
         raise InputError(f"position has shape {position.shape}; it must be (3,)")
-    # Whole turns are taken off first, because their digits would be missing in the joints' angles.
+    # Whole turns are removed first, because they would cost digits of the joint angles.
     pitch = _free_pitch(boom, position, constraint) if pitch is None else float(np.fmod(scalar("pitch", pitch), 2.0 * np.pi))
     found = solve_branches(boom, position, pitch, constraint)
     free = not position[:2].any()
@@ -111,34 +122,41 @@ def inverse_kinematics_of_pose(
     reference: ArrayLike | None = None,
     tolerance: float = 1e-6,
 ) -> Solutions:
-    """Every branch that puts frame 11 at a homogeneous transform T_1_11 (4, 4) (thesis, eq. 2.17), under a constraint.
+    """Return every branch that puts frame 11 at a pose (thesis, eq. 2.17), under a constraint.
 
-    Five joints cannot have every orientation: the wrist's axis z stays horizontal, and the tip in the arm's plane across it.
+    Five joints cannot reach every orientation: the z axis of the wrist is always horizontal, and
+    the tip lies in the arm's plane perpendicular to it.
 
     Args:
-        tolerance: [rad, m] by which T may miss what the arm can have.
+        boom: the boom.
+        T: homogeneous transform T_1_11 (4, 4).
+        constraint: the extra constraint, or its word.
+        reference: as in `inverse_kinematics`.
+        tolerance: largest deviation [rad, m] of T from what the arm can reach.
 
     Raises:
-        InputError: T is not finite, not (4, 4), or no rigid transform.
-        InfeasibleError: the arm cannot have this orientation, or not at this place; says why and by how much.
+        InputError: T is not finite, not (4, 4), or not a rigid transform.
+        InfeasibleError: the arm cannot reach this orientation, or not at this position; the message
+            gives the deviation.
     """
     T = checked("T", T, 4)
     if T.shape != (4, 4):
         raise InputError(f"T has shape {T.shape}; it must be (4, 4)")
     R, position = T[:3, :3], T[:3, 3]
     if not np.allclose(R @ R.T, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0.0 or not np.allclose(T[3], [0, 0, 0, 1]):
-        raise InputError("T is no rigid transform: a rotation, a place and a last row of 0 0 0 1")
+        raise InputError("T is not a rigid transform; it must have a rotation matrix and a last row of 0 0 0 1")
     if abs(R[2, 2]) > tolerance:
         tilt = np.degrees(np.arcsin(np.clip(abs(R[2, 2]), 0.0, 1.0)))
         raise InfeasibleError(
-            f"the boom cannot have this orientation: z of its tip stays horizontal, here it tilts by {tilt:.4g} deg"
+            "the boom cannot reach this orientation: the z axis of its tip is always horizontal, "
+            f"here it tilts by {tilt:.4g} deg"
         )
     yaw = np.arctan2(R[0, 2], -R[1, 2])
     beside = float(position[0] * np.sin(yaw) - position[1] * np.cos(yaw))
     if abs(beside) > tolerance:
         raise InfeasibleError(
-            f"the boom cannot have this orientation there: its plane at yaw {np.degrees(yaw):.4g} deg passes the tip "
-            f"by {abs(beside):.4g} m"
+            f"the boom cannot reach this orientation at this position: its plane at yaw {np.degrees(yaw):.4g} deg "
+            f"misses the tip by {abs(beside):.4g} m"
         )
     pitch = float(np.arctan2(R[2, 0], R[0, 0] * np.cos(yaw) + R[1, 0] * np.sin(yaw)))
     constraint = parse_constraint(constraint) if isinstance(constraint, str) else constraint
@@ -157,16 +175,18 @@ def _solution(boom: Boom, q: Array, note: tuple[str, ...] = ()) -> Solution:
 
 def _overloads(boom: Boom, q: Array) -> list[str]:
     held = np.abs(gravity_torque(boom, q))
-    limits = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
     return [
-        f"{joint} must constraint {torque:.4g} Nm, and its drive allows {float(limit):.4g} Nm"
-        for joint, torque, limit in zip(JOINTS, held, limits, strict=True)
-        if limit is not None and torque > limit
+        f"{joint} must hold {torque:.4g} Nm, and its drive allows {limit:.4g} Nm"
+        for joint, torque, limit in zip(JOINTS, held, static_limits(boom), strict=True)
+        if torque > limit
     ]
 
 
 def _free_pitch(boom: Boom, position: Array, constraint: Constraint) -> float:
-    """The pitch with the least cost, by a scan of the whole turn and golden section; straight down where none is reachable."""
+    """Return the pitch of least cost, by a scan of the whole turn and golden section.
+
+    It is straight down if the position cannot be reached at any pitch.
+    """
     chooses = LargestMargin() if isinstance(constraint, FixingConstraint) else constraint
 
     def cost(pitch: Array) -> Array:
@@ -182,47 +202,40 @@ def _free_pitch(boom: Boom, position: Array, constraint: Constraint) -> float:
     if not np.isfinite(costs[best]):
         return -np.pi / 2.0
     step, middle = turn[1] - turn[0], float(turn[best])
-    a, b = middle - step, middle + step
-    for _ in range(_REFINEMENTS):
-        c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
-        left, right = cost(np.array([c, d]))
-        a, b = (a, d) if left <= right else (c, b)
-    refined = (a + b) / 2.0
+    refined = float(golden_section(cost, np.array(middle - step), np.array(middle + step), _REFINEMENTS))
     return refined if cost(np.array([refined]))[0] <= costs[best] else middle
 
 
 def solve_branches(boom: Boom, position: ArrayLike, pitch: ArrayLike, constraint: Constraint) -> Branches:
-    """Every branch for a batch of targets under one constraint.
+    """Return every branch for a batch of targets under one constraint.
 
     Args:
-        position: (..., 3) of the tip in frame 1 [m].
+        boom: the boom.
+        position: (..., 3) positions of the tip in frame 1 [m].
         pitch: (...) [rad].
-        constraint: the extra constraint, or the choice among all joint positions within the limits.
+        constraint: the extra constraint.
 
     Raises:
-        InputError: an input is not finite or of the wrong shape.
+        InputError: an input is not finite or has the wrong shape.
     """
     if not isinstance(constraint, Constraint):
         raise InputError(f"constraint is {constraint!r}; it must be one of the constraints of boom_model")
-    position, pitch = checked("position", position, 3) + 0.0, checked("pitch", pitch)  # + 0.0 takes the sign off a zero
+    # Adding 0.0 turns -0.0 into 0.0.
+    position, pitch = checked("position", position, 3) + 0.0, checked("pitch", pitch)
     try:
         x, y, z, pitch = np.broadcast_arrays(*np.moveaxis(position, -1, 0), pitch)
     except ValueError:
         raise InputError(f"shapes do not match: position {position.shape}, pitch {pitch.shape}") from None
-    with np.errstate(over="ignore", invalid="ignore"):  # an absurdly far target is out of reach, not an error
+    # A target so far that floats overflow is out of reach, not an error.
+    with np.errstate(over="ignore", invalid="ignore"):
         return _branches(boom, x, y, z, pitch, constraint)
 
 
 def _branches(boom: Boom, x: Array, y: Array, z: Array, pitch: Array, constraint: Constraint) -> Branches:
     side = np.array([1.0, -1.0])
-    g, radius = boom.geometry, np.hypot(x, y)[..., None]
-    targets = Targets(
-        theta1=np.arctan2(y, x)[..., None] + np.where(side < 0.0, np.pi, 0.0),
-        F=side * radius - g.L2 - g.L8 * np.cos(pitch)[..., None],
-        G=np.repeat((z - g.L1 - g.L8 * np.sin(pitch))[..., None], 2, axis=-1),
-        phi=np.repeat((pitch - np.pi / 2.0)[..., None], 2, axis=-1),
-    )
-    distinct = (side > 0.0) | (radius > 0.0)
+    position = np.stack([x, y, z], axis=-1)[..., None, :]
+    targets = targets_at(boom, position, pitch[..., None], side)
+    distinct = (side > 0.0) | (np.hypot(x, y)[..., None] > 0.0)
     if isinstance(constraint, FixingConstraint):
         q, exists = _constrained(boom, targets, constraint, distinct)
     else:
@@ -231,7 +244,10 @@ def _branches(boom: Boom, x: Array, y: Array, z: Array, pitch: Array, constraint
 
 
 def _constrained(boom: Boom, targets: Targets, constraint: FixingConstraint, distinct: Mask) -> tuple[Array, Mask]:
-    """q (..., 4, 5) and existence (..., 4) for targets (..., 2): both roots of either side."""
+    """Return joint positions (..., 4, 5) and their existence (..., 4) for targets (..., 2).
+
+    Each side of the base has two roots of the closure.
+    """
     theta1, F, G, phi = (np.repeat(x, 2, axis=-1) for x in targets)
     root = np.array([1.0, -1.0, 1.0, -1.0])
     if isinstance(constraint, FixedExtension):
@@ -247,7 +263,7 @@ def _constrained(boom: Boom, targets: Targets, constraint: FixingConstraint, dis
 
 
 def _chosen(boom: Boom, targets: Targets, constraint: ChoosingConstraint, distinct: Mask) -> tuple[Array, Mask]:
-    """q (..., 2, 5) and existence (..., 2) for targets (..., 2)."""
+    """Return joint positions (..., 2, 5) and their existence (..., 2) for targets (..., 2)."""
     shape = targets.F.shape
     flat = Targets(*(np.reshape(x, -1) for x in targets))
     q, exists = np.empty((flat.F.size, 5)), np.empty(flat.F.size, dtype=bool)

@@ -7,9 +7,11 @@ elements to check a design.
 
 from boom_model.link_design.beam import Beam, Forces, LoadCases, deflection, internal_forces, mass, stress_height, von_mises
 from boom_model.link_design.buckling import critical_load, euler_load
-from boom_model.link_design.exact import Design, Limits, least_mass, stress_only
+from boom_model.link_design.exact import Design, least_mass
+from boom_model.link_design.limits import Limits
 from boom_model.link_design.link import LINKS, Link, link_body, load_link, with_body
 from boom_model.link_design.materials import Material
+from boom_model.link_design.search import stress_only
 from boom_model.link_design.thesis_method import THESIS_LOAD, ThesisDesign, ThesisLoad, thesis_design
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""The certificate of a planned motion: its worst ratio to each limit, recomputed from the model."""
+"""Certificate of a planned motion: the worst ratio to each limit, recomputed from the model."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,18 +14,19 @@ from planner.timing.worst_ratios import States, WorstRatio, states_of, worst_of
 
 @dataclass(frozen=True)
 class Certificate:
-    """The worst ratio to each limit over a planned motion."""
+    """Worst ratio of demand to limit over a planned motion, for each limit."""
 
     samples: int
+    """Number of points at which the ratios were computed."""
     worst: tuple[WorstRatio, ...]
     iterations: int
-    """Solves of the planner, over all parts of the motion."""
+    """Number of solves of the planner, summed over the parts of the motion."""
     residual: float
-    """What one more solve could still add, as a share of a limit, the most of the parts."""
+    """Largest change of a ratio that one more solve could make, over the parts of the motion."""
 
     @property
     def broken(self) -> tuple[WorstRatio, ...]:
-        """The ratios that are too large."""
+        """Ratios above 1 by more than the tolerance."""
         return tuple(worst for worst in self.worst if worst.ratio > 1.0 + RATIO_TOLERANCE)
 
 
@@ -36,16 +37,17 @@ def certify(
     average_torque: bool = False,
     evaluated: Evaluation | None = None,
 ) -> Certificate:
-    """Return the worst ratio to each limit, with what the planner says of its own solves.
+    """Compute the worst ratio to each limit; add the planner's solve count and residual.
 
-    Only the base's tilt is counted: what else a vehicle does was not planned for.
+    Of the vehicle's motion only the tilt counts, because planning accounts for the tilt only.
 
     Args:
         boom: the boom.
-        motions: the motions from stop to stop, in turn.
-        base: how the base is tilted; None is level.
-        average_torque: whether the gearboxes' average torque was asked for too.
-        evaluated: of the same motions on the same base; its states are not evaluated again.
+        motions: the motions from stop to stop, in order.
+        base: tilt of the base; None is level.
+        average_torque: whether to include the gearboxes' average torque.
+        evaluated: evaluation of the same motions on the same base, if there is one. Its states
+            are reused.
     """
     states = _states(boom, motions, base, evaluated)
     worst = worst_of(boom, motions, states, average_torque)
@@ -53,8 +55,8 @@ def certify(
     return Certificate(len(states.t), worst, sum(law.iterations for law in laws), max(law.residual for law in laws))
 
 
-def certified(evaluation: Evaluation) -> Certificate | None:
-    """Return the certificate of an evaluated plan; None of an empty one, and where only samples are known."""
+def certificate_of(evaluation: Evaluation) -> Certificate | None:
+    """Return the certificate of an evaluated plan; None for an empty move and for mere samples."""
     planned = evaluation.planned
     if planned is None or not planned.motions:
         return None
@@ -63,7 +65,11 @@ def certified(evaluation: Evaluation) -> Certificate | None:
 
 
 def _states(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None, evaluated: Evaluation | None) -> States:
-    """The evaluation's states, and those beside every jump and of what is missing to LEAST_SAMPLES a part, in order of time."""
+    """Return the states to certify, in order of time.
+
+    These are the evaluation's states, the states on both sides of every jump, and as many more as
+    each part needs for LEAST_SAMPLES.
+    """
     if evaluated is None:
         return states_of(boom, motions, base, [0] * len(motions))
     starts = np.cumsum([0.0, *(motion.duration for motion in motions)])

@@ -1,4 +1,4 @@
-"""One evaluation of a motion: its states and loads on one grid, which certificate, checks and reports read."""
+"""States and loads of a motion on one grid. Certificate, checks and reports read them from here."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,36 +15,37 @@ from planner.motion.vehicle import LEVEL, VehicleCase
 from planner.timing.limit_ratios import Limit, limit_ratios
 
 INERTIA_POSES = 1000
-"""Poses of a motion, evenly spread, at which its inertia is looked at."""
+"""Number of evenly spread poses of a motion at which the mass matrix is computed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """States and loads of a motion at times t (n,), with the joints' friction where it is known."""
+    """States and loads of a motion at times t (n,). Loads include the joints' known friction."""
 
     boom: Boom
     trajectory: Trajectory
-    """The grid: a planned motion's own fine one, or a sampled motion's samples."""
+    """States on the grid: the fine grid of a planned motion, or the samples of a sampled one."""
     planned: PlannedMotion | None
-    """The continuous motion; None where only samples are known."""
+    """Continuous motion; None if only samples are known."""
     vehicle: VehicleCase
     payload_as: PayloadAs
     base: BaseMotion | None
-    """How the vehicle moves the base; None at rest on level ground."""
+    """Motion of the vehicle under the boom; None at rest on level ground."""
     loads: Loads
 
     @property
     def t(self) -> Array:
+        """Times (n,) [s]."""
         return self.trajectory.t
 
     @property
     def tau(self) -> Array:
-        """(n, 5) joint torques."""
+        """Joint torques (n, 5) [Nm], a force [N] at the extension."""
         return self.loads.tau
 
     @cached_property
     def static(self) -> Array:
-        """(n, 5) torque that holds each pose on the tilted base, without friction."""
+        """Static torque (n, 5) at each pose on the tilted base, without friction."""
         still = np.zeros(5)
         tilt = None if self.base is None else BaseMotion.of(up=self.base.up)
         q = self.trajectory.q
@@ -52,37 +53,37 @@ class Evaluation:
 
     @cached_property
     def inertia(self) -> Array:
-        """(m, 5, 5) mass matrix at up to INERTIA_POSES of the poses; the drives' own inertia is left out."""
+        """Mass matrix (m, 5, 5) at up to INERTIA_POSES poses, without the drives' own inertia."""
         count = len(self.t)
         poses = np.unique(np.linspace(0, count - 1, min(count, INERTIA_POSES)).astype(int))
         return mass_matrix(self.boom, self.trajectory.q[poses])
 
     @cached_property
     def friction(self) -> Array:
-        """(n, 5) the part of the torques that overcomes friction."""
+        """Part of the torques (n, 5) that overcomes friction."""
         return self.boom.friction.torque(self.trajectory.qd)
 
     @cached_property
     def ratios(self) -> dict[Limit, Array]:
-        """Demand over limit (n, 5) by limit."""
+        """Demand divided by limit (n, 5), for each limit."""
         motion = self.trajectory
         return limit_ratios(self.boom, motion.q, motion.qd, motion.qdd, motion.qddd, self.tau)
 
     @cached_property
     def shock(self) -> Shock | None:
-        """The vehicle's shock, what the joints bear without it, and whether the grid sees it; None without a shock."""
+        """Shock of the vehicle, with the torques without it; None if the vehicle has no shock."""
         vehicle, t = self.vehicle, self.t
         if vehicle.peak == 0.0:
             return None
-        calm = _loads(self.boom, self.trajectory, replace(vehicle, peak=0.0).base(t), self.payload_as, reactions=False)
+        undisturbed = _loads(self.boom, self.trajectory, replace(vehicle, peak=0.0).base(t), self.payload_as, reactions=False)
         start, end = vehicle.shock_start, vehicle.shock_start + vehicle.shock_duration
         inside = (t >= start) & (t <= end)
         resolved = bool(t[0] <= start and end <= t[-1] and inside.sum() >= SHOCK_SAMPLES)
-        return Shock(calm.tau, resolved, inside, vehicle.shock_duration, vehicle.shock_events)
+        return Shock(undisturbed.tau, resolved, inside, vehicle.shock_duration, vehicle.shock_events)
 
     @property
     def basis(self) -> Basis:
-        """How far the vehicle's figures behind the torques can be trusted."""
+        """Basis of the vehicle's figures, on which the torques depend."""
         return self.vehicle.origin.basis
 
 
@@ -94,16 +95,21 @@ def evaluate(
     payload_as: PayloadAs = "mass",
     reactions: bool = True,
 ) -> Evaluation:
-    """States and loads of a motion, on one grid.
+    """Return states and loads of a motion on one grid.
 
-    A planned motion, or a trajectory sampled from one, is evaluated on the plan's fine grid; any other at its samples.
+    A planned motion, or a trajectory sampled from one, is evaluated on the plan's fine grid. Any
+    other trajectory is evaluated at its samples.
 
     Args:
-        vehicle: what the vehicle does meanwhile.
-        payload_as, reactions: see `inverse_dynamics`.
+        boom: the boom.
+        motion: the planned motion or the samples.
+        vehicle: motion of the vehicle under the boom.
+        payload_as: see `inverse_dynamics`.
+        reactions: see `inverse_dynamics`.
 
     Raises:
-        InputError: as `inverse_dynamics`, or a load is not finite because a state is absurdly large; the sample is named.
+        InputError: as `inverse_dynamics`, or a torque is not finite because a state is too large.
+            The message names the sample.
     """
     if isinstance(motion, Trajectory) and motion.planned is not None:
         motion = motion.planned
@@ -122,7 +128,19 @@ def at_samples(
     reactions: bool = True,
     planned: PlannedMotion | None = None,
 ) -> Evaluation:
-    """`evaluate` at the trajectory's own samples, for what is shown or written at them."""
+    """Return states and loads at the trajectory's own samples, even if a plan is behind them.
+
+    Args:
+        boom: the boom.
+        trajectory: the samples.
+        vehicle: motion of the vehicle under the boom.
+        payload_as: see `inverse_dynamics`.
+        reactions: see `inverse_dynamics`.
+        planned: the continuous motion behind the samples.
+
+    Raises:
+        InputError: as `evaluate`.
+    """
     base = vehicle.base(trajectory.t)
     loads = _loads(boom, trajectory, base, payload_as, reactions)
     return Evaluation(boom, trajectory, planned, vehicle, payload_as, base, loads)
@@ -135,5 +153,5 @@ def _loads(boom: Boom, trajectory: Trajectory, base: BaseMotion | None, payload_
     finite = np.isfinite(loads.tau).all(axis=-1)
     if not finite.all():
         at = int(np.argmin(finite))
-        raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: its torques are not finite; its state is too large")
+        raise InputError(f"sample {at}, t = {trajectory.t[at]:g} s: torques are not finite because the state is too large")
     return loads

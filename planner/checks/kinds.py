@@ -1,4 +1,4 @@
-"""The kinds of check: what each one compares, in which unit people read it, and what follows when the limit is exceeded."""
+"""Kinds of check: compared quantity, displayed unit, severity, and required margin."""
 
 from dataclasses import dataclass
 from enum import Enum, StrEnum
@@ -10,7 +10,7 @@ from boom_model.drives.drive import STEPPER_MARGIN
 
 
 class Part(StrEnum):
-    """Part of the boom that a check is about."""
+    """Part of the boom that a check concerns."""
 
     JOINT = "joint"
     GEARBOX = "gearbox"
@@ -18,39 +18,39 @@ class Part(StrEnum):
     ACTUATOR = "actuator"
     BRAKE = "brake"
     UNKNOWN_DRIVE = "unknown drive"
-    """A joint without drive data: what it needs of a drive."""
+    """Drive of a joint without drive data. The rows show what it must provide."""
     MOUNT = "mount"
     ARM = "arm"
     TIP = "tip"
 
 
 DRIVE_PARTS = frozenset({Part.GEARBOX, Part.MOTOR, Part.ACTUATOR, Part.BRAKE, Part.UNKNOWN_DRIVE})
-"""Parts whose checks are about a drive."""
+"""Parts that belong to a drive."""
 
 
 class Severity(StrEnum):
-    """What follows when a demand exceeds its limit."""
+    """Consequence of a demand that exceeds its limit."""
 
     LIMIT = "limit"
-    """The row FAILs."""
+    """Limit check: the row FAILs."""
     GUIDELINE = "guideline"
-    """The row WARNs: a rule of thumb."""
+    """Rule of thumb: the row WARNs."""
     INFORMATION = "information"
-    """Nothing: the figure has no limit of its own, or none that decides."""
+    """No consequence. The row is INFO: it has no limit, or one that does not decide."""
 
 
 class Margin(StrEnum):
-    """What a row's margin is."""
+    """Definition of a row's margin."""
 
     RATIO = "ratio"
     """(limit - demand) / demand"""
     DISTANCE = "distance"
-    """The distance to the bound, in the row's unit."""
+    """Distance to the bound, in the row's unit."""
 
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit in which people read a figure: its name, and how many of it one SI unit makes."""
+    """Displayed unit: its name, and its number per SI unit."""
 
     name: str
     per_si: float = 1.0
@@ -61,20 +61,20 @@ _RPM = 60.0 / (2.0 * np.pi)
 
 
 class Quantity(Enum):
-    """What a check compares: its SI unit where the joint turns and where it slides, and the same for people."""
+    """Compared quantity: SI units at a revolute and at a prismatic joint, displayed unit."""
 
     POSITION = ("rad", "m", Unit("deg", _DEGREE))
     VELOCITY = ("rad/s", "m/s", Unit("deg/s", _DEGREE))
     ACCELERATION = ("rad/s^2", "m/s^2", Unit("deg/s^2", _DEGREE))
     JERK = ("rad/s^3", "m/s^3", Unit("deg/s^3", _DEGREE))
     SHAFT_SPEED = ("rad/s", "rad/s", Unit("rpm", _RPM))
-    """Of a motor, a gearbox's input or a screw."""
+    """Speed of a motor, a gearbox's input or a screw."""
     LOST_MOTION = ("rad", "rad", Unit("mrad", 1e3))
-    """Of a gearbox, at its output."""
+    """Lost motion of a gearbox, at its output."""
     TORQUE = ("Nm", "N", None)
-    """Of a joint: a force where it slides."""
+    """Torque at a revolute joint, force at a prismatic joint."""
     MOMENT = ("Nm", "Nm", None)
-    """Of a shaft, or on the mount."""
+    """Moment on a shaft or on the mount."""
     FORCE = ("N", "N", None)
     POWER = ("W", "W", None)
     LENGTH = ("m", "m", None)
@@ -87,34 +87,37 @@ class Quantity(Enum):
 
     @property
     def _units(self) -> tuple[str, str, Unit | None]:
-        turning, sliding, shown = self.value
-        return turning, sliding, shown
+        revolute, prismatic, shown = self.value
+        return revolute, prismatic, shown
 
     def unit(self, joint: str) -> str:
-        """The SI unit of a row of that joint; what is no joint turns."""
-        turning, sliding, _ = self._units
-        return sliding if _slides(joint) else turning
+        """Return the SI unit of a joint's row. Rows without a joint use the revolute unit."""
+        revolute, prismatic, _ = self._units
+        return prismatic if _is_prismatic(joint) else revolute
 
     def for_people(self, joint: str) -> Unit:
-        """The unit in which people read a row of that joint."""
-        turning, sliding, shown = self._units
-        si = sliding if _slides(joint) else turning
-        return Unit(si) if shown is None or si != turning else shown
+        """Return the displayed unit of a joint's row."""
+        revolute, prismatic, shown = self._units
+        si = prismatic if _is_prismatic(joint) else revolute
+        return Unit(si) if shown is None or si != revolute else shown
 
 
-def _slides(joint: str) -> bool:
+def _is_prismatic(joint: str) -> bool:
     return joint in JOINTS and bool(IS_LENGTH[JOINTS.index(joint)])
 
 
 class CheckKind(StrEnum):
-    """A kind of check. Its value is the text in reports and JSON; a clearance's row adds what is close to what."""
+    """Kind of check. Its value is the text in reports and JSON.
+
+    The row of a clearance adds which link is close to which shape.
+    """
 
     part: Part
     quantity: Quantity
     severity: Severity
     margin: Margin
     required_margin: float
-    """The margin that a demand must keep."""
+    """Smallest margin that passes."""
 
     def __new__(
         cls,
@@ -125,6 +128,7 @@ class CheckKind(StrEnum):
         margin: Margin = Margin.RATIO,
         required_margin: float = 0.0,
     ) -> "CheckKind":
+        """Return the member; its value is the text alone."""
         kind = str.__new__(cls, text)
         kind._value_ = text
         kind.part, kind.quantity, kind.severity = part, quantity, severity
@@ -196,5 +200,5 @@ class CheckKind(StrEnum):
     TIP_HYSTERESIS = "hysteresis", Part.TIP, Quantity.DEFLECTION, Severity.INFORMATION
     TIP_STEP_ERROR = "step error", Part.TIP, Quantity.DEFLECTION, Severity.INFORMATION
     TIP_DEFLECTION = "deflection in all", Part.TIP, Quantity.DEFLECTION
-    """For information where no tolerance is asked for."""
+    """INFO if no tolerance is given."""
     TIP_FREQUENCY = "first frequency", Part.TIP, Quantity.FREQUENCY, Severity.INFORMATION

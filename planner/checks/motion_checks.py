@@ -1,4 +1,4 @@
-"""A motion held against the joint limits and the drives' datasheets, row by row."""
+"""Checks of a motion against the joint limits and the drives' datasheets."""
 
 from collections.abc import Iterator
 
@@ -19,11 +19,14 @@ from planner.paths.clearance import nearest_approach
 
 
 def check_rows(evaluation: Evaluation, duty: Duty | None = None) -> tuple[Row, ...]:
-    """Every check of a motion: positions, speeds, accelerations and jerk, then each joint's drive, the mount, and the tip.
+    """Return every check of a motion.
+
+    Checks of position, velocity, acceleration and jerk come first, then those of each joint's
+    drive, the mount, the clearance and the tip.
 
     Args:
-        evaluation: of the motion, with its reactions; the mount is left out without them.
-        duty: the cycle that the samples stand for; None is the motion alone.
+        evaluation: evaluation of the motion. Without reactions the mount is not checked.
+        duty: duty cycle that the samples represent; None is the motion repeated without a pause.
     """
     boom, motion = evaluation.boom, evaluation.trajectory
     duty = Duty.alone(motion.t) if duty is None else duty
@@ -44,7 +47,7 @@ def check_rows(evaluation: Evaluation, duty: Duty | None = None) -> tuple[Row, .
 
 
 def joint_views(evaluation: Evaluation, duty: Duty | None = None) -> tuple[JointView, ...]:
-    """The motion as each joint sees it."""
+    """Return what the drive checks need to know of each joint's motion."""
     boom, motion, base, shock = evaluation.boom, evaluation.trajectory, evaluation.base, evaluation.shock
     origins = boom.friction.origins
     return tuple(
@@ -54,7 +57,7 @@ def joint_views(evaluation: Evaluation, duty: Duty | None = None) -> tuple[Joint
             trajectory=motion,
             duty=Duty.alone(motion.t) if duty is None else duty,
             tau=evaluation.tau[:, i],
-            calm=evaluation.tau[:, i] if shock is None else shock.calm[:, i],
+            tau_without_shock=evaluation.tau[:, i] if shock is None else shock.tau_without_shock[:, i],
             friction=evaluation.friction[:, i],
             coulomb=float(boom.friction.coulomb[i]),
             static=evaluation.static[:, i],
@@ -70,11 +73,14 @@ def joint_views(evaluation: Evaluation, duty: Duty | None = None) -> tuple[Joint
 def drive_rows(
     view: JointView, drive: Drive | LinearDrive, shock: Shock | None = None, retracted: float = 0.0
 ) -> Iterator[Row]:
-    """Every check of a joint's gearbox and motor, or of its linear actuator.
+    """Return every check of a joint's gearbox and motor, or of its linear actuator.
 
     Args:
-        shock: the vehicle's, which a gearbox may meet up to its momentary peak torque; None without one.
-        retracted: the joint's lower limit [m], from which an actuator's stroke counts.
+        view: motion of the joint.
+        drive: the joint's drive.
+        shock: shock of the vehicle, if there is one. During it a gearbox may reach its momentary
+            peak torque.
+        retracted: the joint's lower limit [m], where an actuator's stroke starts.
     """
     if isinstance(drive, LinearDrive):
         yield from actuator_rows(view, drive, retracted)
@@ -102,7 +108,7 @@ def _position_rows(evaluation: Evaluation, i: int) -> Iterator[Row]:
         return
     for kind, angle, bound, origin in (
         (CheckKind.LINKAGE, motion.q[:, 2] - motion.q[:, 1], limits.linkage, limits.origins["linkage"][0]),
-        # near the flat parallelogram the pins' forces grow
+        # pin forces grow as the parallelogram becomes flat
         (CheckKind.TRANSMISSION_ANGLE, transmission_angle(motion.q), limits.transmission, limits.origins["transmission"][0]),
     ):
         at = int(np.argmin(angle))
@@ -127,7 +133,7 @@ def _rate_rows(evaluation: Evaluation, i: int) -> Iterator[Row]:
 
 
 def _clearance_rows(evaluation: Evaluation) -> Iterator[Row]:
-    """The arm's nearest approach to what it must keep away from, as the mount carries it."""
+    """Return the check of the smallest distance between the arm and the keep-out shapes."""
     keep = evaluation.boom.keep_out
     if keep is None:
         return
@@ -146,7 +152,7 @@ def _clearance_rows(evaluation: Evaluation) -> Iterator[Row]:
 
 
 def _undriven_rows(view: JointView) -> Iterator[Row]:
-    """What a joint asks of a drive that is not given."""
+    """Return what the motion requires of a drive, at a joint without drive data."""
     origin = Origin(Basis.PRINTED, "NOT CHECKED: no drive data")
     for kind, values in (
         (CheckKind.DRIVE_PEAK_FORCE if view.is_length else CheckKind.DRIVE_PEAK_TORQUE, view.tau),
@@ -176,5 +182,7 @@ def _mount_rows(evaluation: Evaluation) -> Iterator[Row]:
             demand=float(size[at]),
             limit=None if bearable is None else bearable.value,
             at=float(evaluation.t[at]),
-            origin=Origin(Basis.PRINTED, "no limit of the vehicle's mount is given") if bearable is None else bearable.origin,
+            origin=Origin(Basis.PRINTED, "the boom's file gives no limit of the mount")
+            if bearable is None
+            else bearable.origin,
         )

@@ -1,4 +1,4 @@
-"""The rows of a report: one demand held against one limit, and the verdict."""
+"""Rows of a report: one demand compared with one limit, and the verdict."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,45 +10,49 @@ from boom_model.boom import LIMIT_TOLERANCE
 from planner.checks.kinds import CheckKind, Severity, Unit
 
 SAMPLING_SLACK = 1e-3
-"""A demand within 0.1 % of its limit is on it: a motion is seen at samples, and solvers end within a tolerance."""
+"""Share of a limit within which a demand counts as equal to it.
+
+Checks see a motion at samples only, and solvers end within a tolerance.
+"""
 
 ESTIMATE_WARNING = 0.25
-"""A margin on an estimated or assumed figure that exceeds the required one by less than this is a WARN, not a PASS."""
+"""Margin beyond the required one below which an estimated or assumed limit WARNs."""
 
 
 class Verdict(StrEnum):
-    """Of a row; a whole report is PASS, FAIL or INCOMPLETE."""
+    """Verdict of a row or of a report. A report is PASS, FAIL or INCOMPLETE."""
 
     PASS = "PASS"
     WARN = "WARN"
     FAIL = "FAIL"
     NOT_CHECKABLE = "NOT CHECKABLE"
     INFO = "INFO"
-    """A figure that has no limit of its own, or none that decides."""
+    """Figure for information, with no limit or with one that does not decide."""
     INCOMPLETE = "INCOMPLETE"
+    """No row failed, and at least one could not be checked."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One demand held against one limit, in SI."""
+    """One demand compared with one limit, in SI."""
 
     joint: str
     kind: CheckKind
     demand: float | None
     limit: float | None
     margin: float | None
-    """As `kind.margin` says; None where there is no limit, or no demand."""
+    """Margin as `kind.margin` defines it; None without a limit or a demand."""
     at_s: float | None
     verdict: Verdict
     basis: Basis | None
-    """The weakest of the figures that decide the row; None where nothing decides it."""
+    """Weakest basis of the figures that decide the row; None if it is not checkable."""
     source: str
     subject: str = ""
-    """What is checked against what, of a kind that has several rows."""
+    """Objects of the check, as in "of payload to post"; empty for most kinds."""
 
     @property
     def check(self) -> str:
-        """The kind in words, with its subject."""
+        """Text of the kind, followed by the subject."""
         return f"{self.kind} {self.subject}" if self.subject else str(self.kind)
 
     @property
@@ -58,15 +62,16 @@ class Row:
 
     @property
     def shown_unit(self) -> Unit:
-        """The unit in which people read demand and limit."""
+        """Displayed unit of demand and limit."""
         return self.kind.quantity.for_people(self.joint)
 
     @property
     def required_margin(self) -> float:
+        """Smallest margin that passes."""
         return self.kind.required_margin
 
     def to_json(self) -> dict[str, Any]:
-        """The row's object in the JSON of `boom plan` and `boom check`, in SI."""
+        """Return the row as an object of the JSON of `boom plan` and `boom check`, in SI."""
         return {
             "joint": self.joint,
             "check": self.check,
@@ -92,12 +97,20 @@ def compared(
     at: float | None = None,
     warn_near: bool = False,
 ) -> Row:
-    """A demand held against a limit that it may not exceed; NOT CHECKABLE without one.
+    """Return the row of a demand that must not exceed its limit.
 
-    Beyond the limit a guideline WARNs and a limit FAILs.
+    The row is NOT CHECKABLE without a limit. If the margin is too small, a guideline WARNs and a
+    limit check FAILs.
 
     Args:
-        warn_near: whether a limit that is only estimated WARNs where the margin is within ESTIMATE_WARNING of the required one.
+        joint: the joint, or the part of the boom that is no joint.
+        kind: the kind of check.
+        demand: the largest demand.
+        limit: the limit; None if it is not known.
+        origin: source of the limit, or the reason why there is none.
+        at: time of the demand [s].
+        warn_near: whether the row WARNs if its margin exceeds the required one by less than
+            ESTIMATE_WARNING. It is for limits that are only estimated.
     """
     if limit is None:
         return unknown(joint=joint, kind=kind, demand=demand, at=at, why=origin.source)
@@ -124,7 +137,11 @@ def compared(
 def bounded(
     *, joint: str, kind: CheckKind, value: float, bound: float, distance: float, at: float, origin: Origin, subject: str = ""
 ) -> Row:
-    """A position or an angle and its distance to the bound, negative beyond it: a limit FAILs there, a guideline WARNs."""
+    """Return the row of a position, angle or distance that has a bound.
+
+    `distance` is the distance to the bound, negative beyond it. Beyond the bound a guideline WARNs
+    and a limit check FAILs.
+    """
     guideline = kind.severity is Severity.GUIDELINE
     inside = distance >= (0.0 if guideline else -LIMIT_TOLERANCE)
     return Row(
@@ -144,7 +161,10 @@ def bounded(
 def informative(
     *, joint: str, kind: CheckKind, figure: float | None, origin: Origin, at: float | None = None, limit: float | None = None
 ) -> Row:
-    """A figure for information, beside a `limit` that does not decide; NOT CHECKABLE where there is no figure."""
+    """Return the row of a figure for information; NOT CHECKABLE if the figure is None.
+
+    The row shows `limit`, which does not decide the verdict.
+    """
     if figure is None:
         return unknown(joint=joint, kind=kind, why=origin.source)
     return Row(
@@ -169,7 +189,7 @@ def unknown(
     limit: float | None = None,
     at: float | None = None,
 ) -> Row:
-    """A check that cannot be made, for want of a limit or of the demand."""
+    """Return the row of a check that cannot be made because the limit or the demand is missing."""
     return Row(
         joint=joint,
         kind=kind,
@@ -184,7 +204,10 @@ def unknown(
 
 
 def overall(rows: Iterable[Row]) -> Verdict:
-    """FAIL where a row fails, INCOMPLETE where one could not be checked, PASS otherwise (a WARN passes)."""
+    """Return the verdict of all rows together.
+
+    FAIL if a row fails, else INCOMPLETE if a row is not checkable, else PASS. A WARN passes.
+    """
     verdicts = {row.verdict for row in rows}
     if Verdict.FAIL in verdicts:
         return Verdict.FAIL

@@ -1,4 +1,4 @@
-"""Stopping in the middle of a move."""
+"""Shortest stops in the middle of a move."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,76 +17,85 @@ from planner.timing.profiles.ruckig_pieces import brake_to_rest
 from planner.timing.time_law import Motion, TimeLaw
 
 MOMENTS = 100
-"""Moments of each part of a move at which a stop is tried."""
+"""Number of equal parts of a motion; a stop is computed at each boundary between two of them."""
 
-_LOOKS = 33
-_TRIES = 7
-_WORTH_LEAVING = 0.8
-_MOST_SHARE = 8.0  # on a curved path the steepest place ahead may lie beyond the stop
-_SLOPES = 2001
+_STOP_SAMPLES = 33
+_BISECTIONS = 7
+_OFF_PATH_GAIN = 0.8  # leave the path only for a stop shorter by this factor
+_MAX_SHARE = 8.0  # above 1 because the steepest part of a curved path may lie beyond the stop
+_PATH_SAMPLES = 2001
 
 
 class Way(StrEnum):
-    """Where a stop goes."""
+    """Kind of stop."""
 
     ON_PATH = "on the path"
     OFF_PATH = "off the path"
-    """Each joint brakes by itself: the tip leaves its path."""
+    """Each joint brakes independently, so the tip leaves its path."""
     FINISH = "finishes the move"
-    """No stop that keeps the limits is shorter."""
+    """No shorter stop respects the limits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stop:
-    """From a motion's state at a moment to rest."""
+    """Motion from a state of a move to rest."""
 
     motion: Motion
     way: Way
 
     @property
     def duration(self) -> float:
+        """Time to rest [s]."""
         return self.motion.duration
 
 
 @dataclass(frozen=True)
 class WorstStop:
-    """The worst of the stops of a move: the longest, and the one that takes the tip farthest."""
+    """Longest stop of a move, and the stop over which the tip travels farthest."""
 
     time_s: float
     time_at_s: float
-    """When the longest begins."""
+    """Time in the move at which the longest stop begins."""
     time_way: Way
     distance_m: float
-    """Of the tip, along its way."""
+    """Distance that the tip travels in the farthest stop."""
     distance_at_s: float
     distance_way: Way
 
 
 def stop(boom: Boom, motion: Motion, at: float, base: BaseMotion | None = None) -> Stop:
-    """The shortest stop found from the moment `at` [s] of a motion, within the limits of joints and drives.
+    """Return the shortest stop found that respects the limits of joints and drives.
 
-    ruckig's velocity interface brings s(t) to rest with the hardest even limit on its deceleration (and jerk, where the
-    motion's is limited) that keeps the limits on the way. On a curved path the curvature alone can take all of a joint's
-    acceleration: where that makes the stop a quarter longer, or impossible, each joint brakes by itself, off the path. What is
-    longer than finishing the move is not used. A boom with shapes to keep away from stops on its path.
+    ruckig's velocity interface brings s(t) to rest with one limit on its deceleration, and on its
+    jerk if the motion's jerk is limited. Bisection finds the largest such limit that respects the
+    limits of joints and drives. On a curved path the curvature alone can use all of a joint's
+    acceleration. If that makes the stop a quarter longer, or impossible, each joint brakes
+    independently and the tip leaves the path. A stop that takes longer than finishing the move is
+    discarded. A boom with keep-out shapes stops on its path.
+
+    Args:
+        boom: the boom.
+        motion: the motion to stop.
+        at: time in the motion at which the stop begins [s].
+        base: tilt of the base; None is level.
 
     Raises:
-        InputError: the moment is not within the motion.
+        InputError: `at` is not within the motion.
     """
     at = scalar("moment", at)
     if not 0.0 <= at <= motion.duration:
-        raise InputError(f"moment is {at:g} s; the motion lasts from 0 to {motion.duration:g} s")
+        raise InputError(f"moment is {at:g} s; it must be from 0 to {motion.duration:g} s, the motion's duration")
     return _stops(boom, motion, np.array([at]), base)[0]
 
 
 def worst_stop(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None = None) -> WorstStop:
-    """The longest and the farthest stop from MOMENTS equal moments of each motion."""
+    """Return the longest and the farthest stop of consecutive motions; see MOMENTS."""
     begun = 0.0
     every: list[tuple[Stop, float, float]] = []
     for motion in motions:
         moments = np.linspace(0.0, motion.duration, MOMENTS + 1)[1:-1]
         stops = _stops(boom, motion, moments, base)
-        q = np.stack([each.motion(np.linspace(0.0, each.duration, _LOOKS))[0] for each in stops])
+        q = np.stack([each.motion(np.linspace(0.0, each.duration, _STOP_SAMPLES))[0] for each in stops])
         lengths = np.linalg.norm(np.diff(forward_kinematics(boom, q).position, axis=1), axis=-1).sum(axis=-1)
         every += zip(stops, lengths.tolist(), (begun + moments).tolist(), strict=True)
         begun += motion.duration
@@ -104,14 +113,14 @@ def _stops(boom: Boom, motion: Motion, moments: Array, base: BaseMotion | None) 
     def off_path(at: float, share: float) -> Motion | None:
         return _joint_brake(boom, motion, at, share)
 
-    found = _hardest(boom, on_path, moments, base, most=1.0 if isinstance(motion.path, JointLine) else _MOST_SHARE)
+    found = _hardest(boom, on_path, moments, base, most=1.0 if isinstance(motion.path, JointLine) else _MAX_SHARE)
     for i, (braked, _) in enumerate(found):
         if braked is not None and braked.duration < stops[i].duration:
             stops[i] = Stop(braked, Way.ON_PATH)
-    # Off the path nobody knows what is in the way.
+    # Clearance was planned on the path only, so a boom with keep-out shapes stays on it.
     held_back = [i for i, (_, share) in enumerate(found) if share < 1.0 and boom.keep_out is None]
     for i, (braked, _) in zip(held_back, _hardest(boom, off_path, moments[held_back], base), strict=True):
-        if braked is not None and braked.duration < _WORTH_LEAVING * stops[i].duration:
+        if braked is not None and braked.duration < _OFF_PATH_GAIN * stops[i].duration:
             stops[i] = Stop(braked, Way.OFF_PATH)
     return stops
 
@@ -119,11 +128,14 @@ def _stops(boom: Boom, motion: Motion, moments: Array, base: BaseMotion | None) 
 def _hardest(
     boom: Boom, brake: Callable[[float, float], Motion | None], moments: Array, base: BaseMotion | None, most: float = 1.0
 ) -> list[tuple[Motion | None, float]]:
-    """The hardest braking of each moment that keeps the limits, and its share, by bisection of all moments at once."""
+    """Return, for each moment, the hardest braking that respects the limits, and its share.
+
+    All moments are bisected together. A motion is None if no braking respects the limits.
+    """
     found: list[Motion | None] = [None] * len(moments)
     soft, hard = np.zeros(len(moments)), np.full(len(moments), most)
     share = np.ones(len(moments))
-    for _ in range(_TRIES if most == 1.0 else _TRIES + 2):
+    for _ in range(_BISECTIONS if most == 1.0 else _BISECTIONS + 2):
         tried = [brake(at, each) for at, each in zip(moments, share, strict=True)]
         kept = _kept(boom, tried, base)
         for i in np.flatnonzero(kept):
@@ -136,18 +148,24 @@ def _hardest(
 
 
 def _limits_from(boom: Boom, motion: Motion, moments: Array) -> dict[float, tuple[float, float]]:
-    """By moment, the least of the acceleration and jerk limits over |p'| on the rest of the path."""
-    s = np.linspace(0.0, 1.0, _SLOPES)
+    """Return, for each moment, the least of limit / |p'| on the rest of the path.
+
+    The first number is for the acceleration limits, the second for the jerk limits.
+    """
+    s = np.linspace(0.0, 1.0, _PATH_SAMPLES)
     ahead = np.maximum.accumulate(np.abs(motion.path(s, 1))[::-1], axis=0)[::-1]
-    at = np.clip(np.searchsorted(s, np.asarray(motion.law.s(moments)), side="right") - 1, 0, _SLOPES - 1)
+    at = np.clip(np.searchsorted(s, np.asarray(motion.law.s(moments)), side="right") - 1, 0, _PATH_SAMPLES - 1)
     with np.errstate(divide="ignore"):
         accelerations, jerks = ((limit / ahead[at]).min(axis=-1) for limit in (boom.limits.acceleration, boom.limits.jerk))
     return dict(zip(moments.tolist(), zip(accelerations.tolist(), jerks.tolist(), strict=True), strict=True))
 
 
 def _path_brake(motion: Motion, at: float, share: float, limits: tuple[float, float]) -> Motion | None:
-    """s(t) from a moment to rest with a share of the path's limits; None where it runs over the path's end."""
-    law, unit = motion.law, motion.duration  # as in `jerk_limited`: ruckig wants numbers of order one
+    """Return the braking on the path with a share of the path's limits.
+
+    None if there is no such braking or it passes the end of the path.
+    """
+    law, unit = motion.law, motion.duration  # as in `jerk_limited`: ruckig needs numbers of order one
     state = [[float(law.s(at, order)) * unit**order] for order in range(3)]
     found = brake_to_rest(state, [share * limits[0] * unit**2], [share * limits[1] * unit**3] if law.jerk_limited else None)
     if found is None:
@@ -157,7 +175,7 @@ def _path_brake(motion: Motion, at: float, share: float, limits: tuple[float, fl
 
 
 def _joint_brake(boom: Boom, motion: Motion, at: float, share: float) -> Motion | None:
-    """Every joint from a moment to rest by itself, with a share of the joints' limits."""
+    """Return the braking of each joint independently, with a share of the joints' limits."""
     from scipy.interpolate import PPoly
 
     q, qd, qdd, _ = motion(at)
@@ -179,12 +197,12 @@ def _joint_brake(boom: Boom, motion: Motion, at: float, share: float) -> Motion 
 
 
 def _kept(boom: Boom, motions: list[Motion | None], base: BaseMotion | None) -> Mask:
-    """Whether each motion keeps the limits of joints and drives; False where there is none."""
+    """Return whether each motion respects the limits of joints and drives; False if it is None."""
     kept = np.zeros(len(motions), dtype=bool)
     there = [i for i, motion in enumerate(motions) if motion is not None]
     if not there:
         return kept
-    states = [motion(motion.law.times(_LOOKS)) for motion in motions if motion is not None]
+    states = [motion(motion.law.times(_STOP_SAMPLES)) for motion in motions if motion is not None]
     starts = np.cumsum([0, *(len(each[0]) for each in states)])[:-1]
     q, qd, qdd, qddd = (np.concatenate(each) for each in zip(*states, strict=True))
     tau = inverse_dynamics(boom, q, qd, qdd, base=base, friction=True, reactions=False).tau

@@ -170,7 +170,17 @@ def size(
     from planner.reports.report import assumptions
     from planner.sizing.choice import Adapt, choose, parse_variant, too_high
     from planner.sizing.pictures import sizing_pictures
-    from planner.sizing.tables import SAVING, motors, no_motion, ranking, saving, sizing_json, sizing_markdown, sizing_notes
+    from planner.sizing.tables import (
+        SAVING,
+        motors,
+        no_motion,
+        not_checked,
+        ranking,
+        saving,
+        sizing_json,
+        sizing_markdown,
+        sizing_notes,
+    )
 
     boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
     files = outputs(document=document, inputs=(mission, boom_file, vehicle))
@@ -210,14 +220,7 @@ def size(
             print_rows(*motors(choices))
             print_lines("note", notes)
         else:
-            print_lines(
-                "not checked",
-                (
-                    text.partition(": NOT CHECKED, ")[0::2][0] + ": " + text.partition(": NOT CHECKED, ")[2]
-                    for text in notes
-                    if ": NOT CHECKED, " in text
-                ),
-            )
+            print_lines("not checked", (f"{joints}: {reason}" for joints, reason in not_checked(choices)))
             print_lines(None, [f"{len(notes)} notes, every drive ranked: --all lists them"])
         print_files(written)
     unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]

@@ -127,7 +127,7 @@ def link(
     boom_file: str | None,
     as_json: bool,
 ) -> int:
-    r"""Design a link: the least mass that holds stress, deflection and buckling, and what it does to the joint's torque.
+    """Design a link: the least mass that holds stress, deflection and buckling, and what it does to the joint's torque.
 
     Without --move and --motion the moves are transport to phenotyping with every profile, each in its least time; for the
     thesis's load its own, a cubic of 5 s.

@@ -78,7 +78,7 @@ def plan(
     written = {"recording": out, "csv": csv_file, "picture": picture, "report": document}
     _write(files, planned, report, written, spec if show_reach else None)
     asked = f"{move.start} to {move.goal}, {report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg"
-    return print_report(report, asked, _given(written, files), as_json, whole, f"boom view {out}")
+    return print_report(report, asked, _given(written), as_json, whole, f"boom view {out}")
 
 
 def _planned(boom: Boom, spec: MoveSpec, as_json: bool) -> "Move":
@@ -139,7 +139,7 @@ def _workspace(boom: Boom, spec: MoveSpec | None) -> Any:
     return reach_map(boom, spec.constraint, spec.pitch)
 
 
-def _given(written: dict[str, str | None], files: "Outputs") -> dict[str, str]:
+def _given(written: dict[str, str | None]) -> dict[str, str]:
     return {kind: name for kind, name in written.items() if name is not None}
 
 
@@ -252,14 +252,14 @@ def check(
       boom check move.csv --payload 8 --out checked.rrd
     """
     from planner.motion.motion_files import read_motion
-    from planner.planning import examine
+    from planner.planning import check_motion
 
     check_picture(picture)
     files = outputs(out, picture, document=document, inputs=(motion, boom_file, vehicle))
     boom = load_boom(boom_file, payload)
-    move = examine(boom, read_motion(motion), payload_as=payload_as, vehicle=load_vehicle(vehicle))
+    move = check_motion(boom, read_motion(motion), payload_as=payload_as, vehicle=load_vehicle(vehicle))
     written = {"recording": out, "picture": picture, "report": document}
     _write(files, move, move.report, written)
     asked = f"{motion}, {move.report.duration:.3f} s, payload {boom.payload.mass:g} kg"
     then = f"boom check {motion} --out checked.rrd" if out is None else f"boom view {out}"
-    return print_report(move.report, asked, _given(written, files), as_json, whole, then)
+    return print_report(move.report, asked, _given(written), as_json, whole, then)

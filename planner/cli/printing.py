@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from planner.reports.report import Report
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
+_FEW_NOTES = 3
 _BETWEEN = 2  # columns between two cells
 _SHORT = 18
 """Cells of up to this many characters are kept on one line."""
@@ -77,6 +78,8 @@ def _print_answer(report: "Report", asked: str, whole: bool) -> None:
         console.print(finding, style=STYLES.get(finding.split()[0]), highlight=False)
     print_lines("possible fix", report.suggestions)
     if not whole:
+        few = len(report.notes) <= _FEW_NOTES
+        print_lines("note", report.notes if few else [f"{len(report.notes)} notes: --all lists them"])
         figures = f"{first.assumed} assumed figure{'' if first.assumed == 1 else 's'}"
         console.print(f"{figures}, {len(report.rows)} checks: --all lists them", highlight=False)
 

@@ -1,4 +1,4 @@
-"""Closed loop: the boom with its drives' elasticity, controllers, and how far the tip is from its plan."""
+"""Closed-loop simulation: plant with elastic drives, controllers, and tracking error of the tip."""
 
 from planner.control.closed_loop import Case, Command, Gust, Run, parse_gust, simulate
 from planner.control.design import Controller, Gains, Goals, Loop, Margins, analyse, design

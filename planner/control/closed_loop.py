@@ -1,4 +1,4 @@
-"""A planned move followed in closed loop by the full nonlinear plant; many cases side by side in one batch."""
+"""Closed-loop simulation of planned moves on the full nonlinear plant, many cases in one batch."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,37 +20,41 @@ from planner.progress import Track
 from planner.timing.time_law import Motion
 
 DIVERGED = 1.0
-"""An error [rad, the extension's in m] at which a case counts as out of control, and is simulated no further."""
+"""Position error [rad, m at the extension] above which a case counts as diverged and is stopped."""
 
-FARTHEST = 1e6
-"""Any coordinate or rate beyond this [SI] is held there, so that a case on its way out of control stays finite to its end."""
+MAX_STATE = 1e6
+"""Bound on coordinates and rates [SI]. It keeps a diverging case finite until it is stopped."""
 
 LONGEST_STEP = 1e-3
-"""Of the integrator [s], unless told otherwise: an eighth of the period of a stepper's rotor about its command."""
+"""Longest default step of the integrator [s].
+
+It is an eighth of the period of a stepper's rotor about its command.
+"""
 
 _BASE = ("velocity", "angular_velocity", "acceleration", "angular_acceleration", "up")
 
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What a controller is asked to follow: a planned move, shaped where asked."""
+    """Reference of a controller: a planned move, filtered by an input shaper."""
 
     motions: tuple[Motion, ...]
     impulses: Impulses
     at_rest: Array
-    """(5,) where an empty move stands."""
+    """(5,) joint position of an empty move."""
 
     @staticmethod
     def of(move: Move, impulses: Impulses) -> "Command":
+        """Return the command of a move with an input shaper."""
         return Command(move.motions, impulses, move.trajectory.q[-1])
 
     @cached_property
     def duration(self) -> float:
-        """[s], the shaper's delay included."""
+        """Duration [s], including the shaper's delay."""
         return sum(motion.duration for motion in self.motions) + float(self.impulses.times[-1])
 
     def __call__(self, t: Array) -> tuple[Array, Array, Array]:
-        """q, qd, qdd (n, 5) at times t (n,), at rest before 0 and after the end."""
+        """Return q, qd, qdd (n, 5) at times t (n,); at rest before 0 and after the end."""
         parts = [self._unshaped(t - late) for late in self.impulses.times]
         q, qd, qdd = (np.tensordot(self.impulses.amplitudes, np.stack(part), 1) for part in zip(*parts, strict=True))
         return q, qd, qdd
@@ -72,25 +76,27 @@ class Command:
 
 @dataclass(frozen=True)
 class Gust:
-    """A push on the tip, force (1 - cos(2 pi (t - start) / duration)) / 2 along frame 1."""
+    """Gust on the tip, force (1 - cos(2 pi (t - start) / duration)) / 2 in frame 1."""
 
     force: tuple[float, float, float]
-    """Largest [N]."""
+    """Largest force [N]."""
     start: float
+    """Start [s]."""
     duration: float
+    """Duration [s]."""
 
     def __call__(self, t: Array) -> Array:
-        """(n, 3) [N] at times t (n,)."""
+        """Return the force (n, 3) [N] at times t (n,)."""
         phase = np.clip((t - self.start) / self.duration, 0.0, 1.0)
         pushes: Array = 0.5 * (1.0 - np.cos(2.0 * np.pi * phase))[:, None] * np.array(self.force)
         return pushes
 
 
 def parse_gust(text: str) -> Gust:
-    """A gust from FX,FY,FZ,START,DURATION in N and s.
+    """Return the gust that FX,FY,FZ,START,DURATION describes, in N and s.
 
     Raises:
-        InputError: not five finite numbers, or a duration that is not above 0.
+        InputError: the text is not five finite numbers, or the duration is not above 0.
     """
     try:
         values = checked("gust", [float(part) for part in text.split(",")], 5)
@@ -98,37 +104,42 @@ def parse_gust(text: str) -> Gust:
         raise InputError(f"gust {text!r} is not FX,FY,FZ,START,DURATION, five finite numbers in N and s") from None
     x, y, z, start, duration = map(float, values)
     if not duration > 0.0:
-        raise InputError(f"gust's duration is {duration:g} s; it must be above 0 s")
+        raise InputError(f"duration of the gust is {duration:g} s; it must be above 0 s")
     return Gust((x, y, z), start, duration)
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """One controller on one command."""
+    """One controller that follows one command."""
 
     command: Command
     gains: tuple[Gains, ...]
-    """Designs at poses evenly spread over the command's duration; a single one holds all along."""
+    """Gains designed at evenly spaced times of the command; a single design holds throughout."""
 
     @staticmethod
     def of(plant: Plant, controller: Controller, goals: Goals, command: Command, knots: int = 17) -> "Case":
-        """A controller designed at the command's end; lqr, whose gains hold one pose's coupling, at `knots` poses of it."""
+        """Return a case whose controller is designed at the end of the command.
+
+        lqr is designed at `knots` poses along the command, because its gains contain the coupling
+        between joints at one pose.
+        """
         t = np.linspace(0.0, command.duration, knots) if controller is Controller.LQR else np.array([command.duration])
         return Case(command, tuple(design(plant, controller, goals, q) for q in command(t)[0]))
 
     @property
     def controller(self) -> Controller:
+        """Kind of controller."""
         return self.gains[0].controller
 
     def place(self, t: ArrayLike) -> tuple[NDArray[np.intp], Array]:
-        """The last design before times t (...), and how far each is on the way to the next, 0 to 1."""
+        """Return the index of the design before times t (...), and the fraction of the way to the next."""
         last = len(self.gains) - 1
         along = np.clip(np.asarray(t) / max(self.command.duration, 1e-9), 0.0, 1.0) * last
         before = np.minimum(along.astype(np.intp), max(last - 1, 0))
         return before, along - before
 
     def gains_at(self, t: float) -> Gains:
-        """Gains at time t [s], linear between designs."""
+        """Return the gains at time t [s], linearly interpolated between designs."""
         before, share = self.place(t)
         low, high = self.gains[before], self.gains[min(int(before) + 1, len(self.gains) - 1)]
         if low is high or share == 0.0:
@@ -139,31 +150,35 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """B cases followed for the same time; n samples, one a controller's period. A case that diverged keeps its last state."""
+    """Simulation of B cases over the same time, with n samples, one per sampling period.
+
+    A case that diverged keeps its last state.
+    """
 
     t: Array
-    """(n,)"""
+    """(n,) times [s]."""
     command: Array
     """(n, B, 5) commanded joint position."""
     q: Array
-    """(n, B, 5) of the links."""
+    """(n, B, 5) joint position of the links."""
     qd: Array
+    """(n, B, 5) joint velocity of the links."""
     motor: Array
-    """(n, B, 5) of the motors at the joints' side; the joint's own where it is not elastic."""
+    """(n, B, 5) motor position at the joint side of the gears; q at a joint that is not elastic."""
     torque: Array
-    """(n, B, 5) asked of the drives [Nm], at the joints' side of the gears, before any limit."""
+    """(n, B, 5) torque command [Nm] at the joint side of the gears, before any limit."""
     limit: Array
-    """(n, B, 5) that the motors have at their speed; infinite where it is not known."""
+    """(n, B, 5) torque that the motors can give at their speed [Nm]; infinite if not known."""
     spring: Array
-    """(n, B, m) T_s"""
+    """(n, B, m) spring torque T_s [Nm]."""
     ended: Array
-    """(B,) time at which a case diverged [s]; NaN of one that did not."""
+    """(B,) time at which a case diverged [s]; NaN if it did not."""
     lost: Array
-    """(B, 5) time at which a stepper lost its first step [s]; NaN where it did not, and of other controllers."""
+    """(B, 5) time at which a stepper lost its first step [s]; NaN if it did not."""
 
 
 class _Table(NamedTuple):
-    """References on the grid of half substeps, (k, R, 5) each, R different commands."""
+    """References (k, R, 5) of R different commands, at the k times of the grid of half substeps."""
 
     q: Array
     qd: Array
@@ -171,7 +186,7 @@ class _Table(NamedTuple):
     gravity: Array
     full: Array
     """Rigid feedforward with the drives' inertia and friction."""
-    rub: Array
+    gearbox_friction: Array
 
 
 def simulate(
@@ -187,32 +202,42 @@ def simulate(
     compensate_sag: bool = False,
     track: Track = iter,
 ) -> Run:
-    """Follows every case from rest, by the classical Runge-Kutta method at `substeps` steps a sampling period.
+    """Simulate every case from rest with the classical Runge-Kutta method.
 
-    The controllers see the motors' positions, quantised; of the vehicle they know its slope. A torque beyond what the motor has
-    at its speed is cut to that, and the sum of the error stands still meanwhile. A stepper's torque is
-    T_available(speed) sin(p N (command - theta)) p = 50 for a step of 1.8 degrees, and damping about the command's speed, at
-    most T_available; the command moves in microsteps. It has lost a step where p N |command - theta| > pi.
+    The controllers read the quantised positions of the motors. They know the slope of the vehicle,
+    but not its other motion. A torque command is limited to what the motor can give at its speed.
+    While it is limited, the integral of the error is frozen.
+
+    A stepper's torque is T_available(speed) sin(p N (command - theta)), with p = 50 for a step of
+    1.8 degrees, plus damping relative to the command's speed. It is at most T_available. The
+    command moves in microsteps. The stepper has lost a step if p N |command - theta| > pi.
 
     Args:
+        plant: the plant.
+        cases: controllers with their commands.
         duration: simulated time [s].
-        model: the boom that the controllers believe in; None is the plant's own.
-        substeps: None takes as many as make a step of at most 1 ms.
-        continuous: whether torques follow exact states at every stage of the integrator, without sampling and filter.
-        compensate_sag: whether the motors are sent ahead by the twist that the model's gravity gives.
-        track: iterates over the sampling periods, and may show how far it is.
+        model: boom that the controllers assume; None is the plant's.
+        vehicle: motion of the vehicle under the boom; None is at rest on level ground.
+        gust: gust on the tip, if there is one.
+        substeps: integration steps per sampling period; None takes enough for steps of at most
+            LONGEST_STEP.
+        continuous: whether the controllers use exact states at every stage of the integrator,
+            without sampling, quantisation and filter.
+        compensate_sag: whether the motor references include the twist under the model's gravity.
+        track: iterates over the sampling periods, and may show progress.
 
     Raises:
-        InputError: no cases, or a duration that is not above 0.
+        InputError: there are no cases, the duration is not above 0, or a stepper has no elastic
+            joint.
     """
     if not cases or not duration > 0.0:
-        raise InputError(f"{len(cases)} cases for {duration:g} s: nothing to simulate")
+        raise InputError(f"nothing to simulate: {len(cases)} cases for {duration:g} s")
     boom, figures = plant.boom if model is None else model, plant.figures
     T, B, E, m = figures.sampling_period, len(cases), plant.columns, len(plant.elastic)
     steppers = np.flatnonzero([case.controller is Controller.STEPPER for case in cases])
     inverse = np.flatnonzero([case.controller is Controller.COMPUTED_TORQUE for case in cases])
     if steppers.size and not m:
-        raise InputError("a stepper is simulated behind an elastic gearbox; no joint is elastic here")
+        raise InputError("a stepper needs an elastic gearbox for its simulation, and no joint is elastic")
     if substeps is None:
         substeps = max(1, int(np.ceil(T / LONGEST_STEP - 1e-9)))
     count, h = int(np.ceil(duration / T - 1e-9)) + 1, T / substeps
@@ -222,7 +247,7 @@ def simulate(
     commands = list(dict.fromkeys(case.command for case in cases))
     table = _table(plant, boom, commands, half, tilt, compensate_sag)
     row = np.array([commands.index(case.command) for case in cases])
-    grounds = _grounds(vehicle, half)
+    grounds = _base_arrays(vehicle, half)
     pushes = None if gust is None else gust(half)
     scheduled = [b for b, case in enumerate(cases) if len(case.gains) > 1]
     Kp, Kd, Ki = (np.stack([getattr(case.gains[0], name) for case in cases]) for name in ("Kp", "Kd", "Ki"))
@@ -232,29 +257,29 @@ def simulate(
     resolution = _resolutions(plant)
     keep = np.exp(-2.0 * np.pi * figures.velocity_filter_Hz * T)
     teeth, holding, drag, micro = _stepper_figures(plant)
-    pulled = np.ix_(steppers, np.array(plant.elastic)) if steppers.size else None  # torques that come from a stepper's field
+    pulled = np.ix_(steppers, np.array(plant.elastic)) if steppers.size else None  # torques of steppers
     field, field_speed = (reference[:, row[steppers]][:, :, E] for reference in (table.q, table.qd))
     field = np.rint(field / micro) * micro
     alive, ended, lost = np.ones(B, dtype=bool), np.full(B, np.nan), np.full((B, 5), np.nan)
     held, cap = np.zeros((B, 5)), np.full((B, 5), np.inf)
 
     def law(i: int, p: Array, v: Array, total: Array) -> Array:
-        """Torques (B, 5) from positions p, velocities v and the integral action, for the reference at half step i."""
-        w = _times(Kp, table.q[i][row] - p) + _times(Kd, table.qd[i][row] - v) + total
+        """Return torques (B, 5) at half step i for positions p, velocities v, integral action."""
+        w = _matvec(Kp, table.q[i][row] - p) + _matvec(Kd, table.qd[i][row] - v) + total
         u: Array = np.where(light, table.gravity[i][row], table.full[i][row]) + w
         if inverse.size:
             a = table.qdd[i][row[inverse]] + w[inverse]
             M, bias = mass_matrix_and_bias(boom, p[inverse], v[inverse], base=tilt)
-            rub = boom.friction.torque(v[inverse]) + table.rub[i][row[inverse]]
-            u[inverse] = _times(M, a) + plant.rotor * a + bias + rub
+            friction_torque = boom.friction.torque(v[inverse]) + table.gearbox_friction[i][row[inverse]]
+            u[inverse] = _matvec(M, a) + plant.rotor * a + bias + friction_torque
         return u
 
     def torque(i: int, x: Array) -> Array:
-        """At half step i: what is held, and what a stepper pulls with."""
+        """Return the applied torques (B, 5) at half step i: held, or a stepper's own torque."""
         u = held
         if continuous:
             q, qd, theta, theta_d = _split(x, m)
-            p, v = _seen(q, theta, E), _seen(qd, theta_d, E)
+            p, v = _measured(q, theta, E), _measured(qd, theta_d, E)
             u = _within(law(i, p, v, total), cap)
         if pulled is not None:
             _, _, theta, theta_d = _split(x[steppers], m)
@@ -264,7 +289,7 @@ def simulate(
         return u
 
     def rates(i: int, x: Array) -> Array:
-        x = np.fmin(np.fmax(x, -FARTHEST), FARTHEST)
+        x = np.fmin(np.fmax(x, -MAX_STATE), MAX_STATE)
         q, qd, theta, theta_d = _split(x, m)
         base = None if grounds is None else BaseMotion(*(ground[i] for ground in grounds))
         push = None if pushes is None else pushes[i]
@@ -272,19 +297,19 @@ def simulate(
         return np.concatenate([qd, qdd, theta_d, theta_dd], axis=1) * alive[:, None]
 
     theta_0 = table.q[0][row]
-    if pulled is not None:  # turned on its command as far as the load at rest pulls it
+    if pulled is not None:  # the rotor lags its command under the load at rest
         pull = gravity_torque(plant.boom, equilibrium(plant, theta_0, tilt), base=tilt)[:, E]
         lag = np.arcsin(np.clip(pull / holding, -1.0, 1.0)) / teeth
         theta_0[pulled] -= lag[steppers]
     x = np.concatenate([equilibrium(plant, theta_0, tilt), np.zeros((B, 5)), theta_0[:, E], np.zeros((B, m))], axis=1)
-    before, v, total = _quantised(_seen(x[:, :5], x[:, 10 : 10 + m], E), resolution), np.zeros((B, 5)), np.zeros((B, 5))
+    before, v, total = _quantised(_measured(x[:, :5], x[:, 10 : 10 + m], E), resolution), np.zeros((B, 5)), np.zeros((B, 5))
 
     torque_s, limit_s = np.empty((count, B, 5)), np.empty((count, B, 5))
     states = np.empty((count, *x.shape))
     for k in track(list(range(count))):
         i = 2 * substeps * k
         q, qd, theta, theta_d = _split(x, m)
-        motor, motor_d = _seen(q, theta, E), _seen(qd, theta_d, E)
+        motor, motor_d = _measured(q, theta, E), _measured(qd, theta_d, E)
         off = np.abs(motor - table.q[i][row])
         fallen = alive & (~np.isfinite(x).all(axis=1) | (off > DIVERGED).any(axis=1))
         ended[fallen], alive[fallen] = k * T, False
@@ -302,7 +327,7 @@ def simulate(
         held = _within(asked, cap)
         if pulled is not None:
             asked[steppers] = torque(i, x)[steppers]
-        total = total + np.where(np.abs(asked) > cap, 0.0, T * _times(Ki, table.q[i][row] - p))
+        total = total + np.where(np.abs(asked) > cap, 0.0, T * _matvec(Ki, table.q[i][row] - p))
         states[k], torque_s[k], limit_s[k] = x, asked, cap
         if k + 1 < count:
             for j in range(substeps):
@@ -310,7 +335,7 @@ def simulate(
     command = np.stack([c(half[:: 2 * substeps])[0] for c in commands], axis=1)[:, row]
     q, qd, theta, _ = _split(states, m)
     spring = spring_torque(plant, q, theta - q[..., E])
-    return Run(half[:: 2 * substeps], command, q, qd, _seen(q, theta, E), torque_s, limit_s, spring, ended, lost)
+    return Run(half[:: 2 * substeps], command, q, qd, _measured(q, theta, E), torque_s, limit_s, spring, ended, lost)
 
 
 def _runge_kutta(rates: Callable[[int, Array], Array], i: int, h: float, x: Array) -> Array:
@@ -326,17 +351,17 @@ def _table(plant: Plant, boom: Boom, commands: Sequence[Command], t: Array, tilt
     q, qd, qdd = (np.stack(part, axis=1) for part in zip(*(command(t) for command in commands), strict=True))
     gravity = gravity_torque(boom, q, base=tilt)
     load = inverse_dynamics(boom, q, qd, qdd, base=tilt, reactions=False, friction=True).tau
-    rub = np.zeros_like(q)
+    gearbox_friction = np.zeros_like(q)
     if E:
-        rub[..., E] = friction(plant, qd[..., E], load[..., E])
+        gearbox_friction[..., E] = friction(plant, qd[..., E], load[..., E])
         if sag:
             q = q.copy()
             q[..., E] += twist_under(plant, q, gravity[..., E])
-    return _Table(q, qd, qdd, gravity, load + plant.rotor * qdd + rub, rub)
+    return _Table(q, qd, qdd, gravity, load + plant.rotor * qdd + gearbox_friction, gearbox_friction)
 
 
 def _schedule(cases: Sequence[Case], t: Array) -> Callable[[int], Array]:
-    """Gains of cases with several designs at each of the times t, as `Case.gains_at`: Kp, Kd and Ki, (3, S, 5, 5)."""
+    """Return a function of the index of t: Kp, Kd and Ki (3, S, 5, 5) of S cases, as `Case.gains_at`."""
     most = max(len(case.gains) for case in cases)
     knots = np.empty((3, len(cases), most, 5, 5))
     for s, case in enumerate(cases):
@@ -354,7 +379,7 @@ def _schedule(cases: Sequence[Case], t: Array) -> Callable[[int], Array]:
     return at
 
 
-def _grounds(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | None:
+def _base_arrays(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | None:
     if vehicle is None:
         return None
     base = base_motion(vehicle, t)
@@ -362,7 +387,10 @@ def _grounds(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | None:
 
 
 def _stepper_figures(plant: Plant) -> tuple[Array, Array, Array, Array]:
-    """Of each elastic joint (m,): p N [1/rad], N T_run, rotor damping at the joint, microstep at the joint."""
+    """Return p N [1/rad], N T_run, rotor damping and microstep, each (m,) for the elastic joints.
+
+    All are at the joint side of the gears.
+    """
     drives = [drive for i in plant.elastic if (drive := plant.boom.drives[i])]
     ratio = np.array([drive.gearbox.ratio for drive in drives])
     step = np.array([drive.motor.step for drive in drives])
@@ -373,7 +401,7 @@ def _stepper_figures(plant: Plant) -> tuple[Array, Array, Array, Array]:
 
 
 def _resolutions(plant: Plant) -> Array:
-    """(5,) what an encoder can tell apart at the joint, 0 where it is exact."""
+    """Return the resolution (5,) of the encoders at the joints; 0 is exact."""
     figures, joint = plant.figures, np.empty(5)
     for i, drive in enumerate(plant.boom.drives):
         counts = figures.joint_counts if drive is None else figures.encoder_counts * drive.gearbox.ratio
@@ -388,7 +416,8 @@ def _quantised(p: Array, resolution: Array) -> Array:
     return rounded
 
 
-def _seen(q: Array, theta: Array, E: slice | list[int]) -> Array:
+def _measured(q: Array, theta: Array, E: slice | list[int]) -> Array:
+    """Return what the encoders measure: theta at elastic joints, q elsewhere."""
     p = q.copy()
     p[..., E] = theta
     return p
@@ -399,11 +428,11 @@ def _split(x: Array, m: int) -> tuple[Array, Array, Array, Array]:
 
 
 def _within(torque: Array, most: Array) -> Array:
-    """A torque cut to +-most."""
+    """Limit a torque to +-most; `np.clip` takes longer on small arrays."""
     cut: Array = np.minimum(np.maximum(torque, -most), most)
     return cut
 
 
-def _times(K: Array, e: Array) -> Array:
+def _matvec(K: Array, e: Array) -> Array:
     product: Array = (K @ e[..., None])[..., 0]
     return product

@@ -1,4 +1,4 @@
-"""A study as pictures: Bode of the loops with the poles, and the tip's error over time."""
+"""Plots of a study: Bode diagrams with closed-loop poles, and the tip error over time."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,18 +13,20 @@ from planner.files import replacing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, which the colour-blind can tell apart: one a controller or joint.
+# Okabe and Ito's palette, safe for colour-blind readers. One colour per controller or joint.
 PALETTE = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233))
 
 
 def loop_figure(study: Study) -> "Figure":
-    """Magnitude and phase of every joint's loop at the goal, a column a controller, and the closed loop's poles below.
+    """Plot magnitude and phase of every joint's loop at the goal, and the closed-loop poles.
+
+    Each controller has a column.
 
     Raises:
         InputError: no controller of the study has a loop.
     """
     if not study.designs:
-        raise InputError("a stepper runs open loop: there is no Bode diagram of it")
+        raise InputError("a stepper runs in open loop and has no Bode diagram")
     columns = len(study.designs)
     figure = _figure(4.2 * columns, 9.0)
     axes = figure.subplots(3, columns, squeeze=False, sharey="row")
@@ -34,7 +36,7 @@ def loop_figure(study: Study) -> "Figure":
             L = design.loop.response[:, i]
             gain.semilogx(design.loop.frequencies, 20.0 * np.log10(np.abs(L)), color=_rgb(i), label=joint)
             angle = np.degrees(np.angle(L))
-            angle[1:][np.abs(np.diff(angle)) > 180.0] = np.nan  # a turn past -180 is no vertical line
+            angle[1:][np.abs(np.diff(angle)) > 180.0] = np.nan  # no vertical line where the phase wraps
             phase.semilogx(design.loop.frequencies, angle, color=_rgb(i))
         for f in study.modes_Hz:
             for each in (gain, phase):
@@ -56,15 +58,15 @@ def loop_figure(study: Study) -> "Figure":
     axes[2, 0].set_ylabel("imaginary part / 2 pi [Hz]")
     axes[0, 0].legend(fontsize=8, loc="lower left")
     figure.suptitle(
-        f"{study.boom.name}: each joint's loop at the goal, the others closed; closed-loop poles. "
-        "Dotted: natural frequencies with the motors held",
+        f"{study.boom.name}: each joint's loop at the goal with the others closed; closed-loop poles. "
+        "Dotted: natural frequencies with the motors fixed",
         fontsize=10,
     )
     return figure
 
 
 def error_figure(study: Study) -> "Figure":
-    """The tip's distance from its command over time, a panel a profile and shaper."""
+    """Plot the tip error over time, with a panel for each profile and shaper."""
     groups = list(dict.fromkeys((row.profile, row.shaper) for row in study.rows))
     figure = _figure(11.0, 1.2 + 2.0 * len(groups))
     axes = figure.subplots(len(groups), 1, squeeze=False, sharex=True)[:, 0]
@@ -82,33 +84,33 @@ def error_figure(study: Study) -> "Figure":
         panel.set_ylim(0.0, 1.05 * max(sound, default=100.0))
         panel.grid(alpha=0.3)
         panel.legend(fontsize=7, loc="upper left", ncols=len(controllers))
-    axes[-1].set_xlabel("t [s]; dotted: the command ends")
+    axes[-1].set_xlabel("t [s]; dotted: end of the command")
     return figure
 
 
 def study_pictures(study: Study) -> dict[str, "Figure"]:
-    """Both, by title; a study of steppers alone has no loops."""
+    """Return both figures by title. A study of steppers only has no loops."""
     loops = {"Loops": loop_figure(study)} if study.designs else {}
     return {"Tip errors": error_figure(study)} | loops
 
 
 def write_figure(path: str | Path, figure: "Figure") -> None:
-    """Writes a figure as a PNG.
+    """Write a figure as a PNG file.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written. An existing file is left unchanged.
     """
     with replacing(path) as temporary:
         Path(temporary).write_bytes(png(figure))
 
 
 def png(figure: "Figure") -> bytes:
-    """The figure as the content of a PNG file."""
+    """Return the figure as the content of a PNG file."""
     from io import BytesIO
 
-    held = BytesIO()
-    figure.savefig(held, format="png")
-    return held.getvalue()
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
 
 
 def _figure(width: float, height: float) -> "Figure":

@@ -1,17 +1,23 @@
-"""The boom as its controllers meet it: rigid links, motors behind elastic gearboxes, links that bend, friction.
+"""Plant model for controller design: rigid links, elastic gearboxes, bending links and friction.
 
-A joint whose gearbox has a printed stiffness has two coordinates, the motor's theta (at the joint's side of the gears) and
-the link's q:
+A joint whose gearbox has a printed stiffness has two coordinates, theta of the motor (at the joint
+side of the gears) and q of the link:
 
-    M(q) qdd + h(q, qd) + friction(qd) = T_s + c (thetad - qd)             q, with u instead at a joint without elasticity
-    J thetadd + F(thetad, T_s) + T_s + c (thetad - qd) = u                 J = N^2 (J_rotor + J_gear)
+    M(q) qdd + h(q, qd) + friction(qd) = T_s + c (thetad - qd)
+    J thetadd + F(thetad, T_s) + T_s + c (thetad - qd) = u         J = N^2 (J_rotor + J_gear)
 
-T_s(theta - q) is the torque of the gearbox's piecewise stiffness K1, K2, K3 in series with the link's bending as a torsional
-spring. A force F at the end of a cantilever of length L moves it by F L^3 / (3 E I), which is the angle F L^2 / (3 E I) seen
-from its root: the inner link, which pin 8 loads by a force alone, is a spring of 3 E I / L at joint 2. The extension, of which
-L_f = clear + theta4 is outside its housing, lets the wrist go across by F L_f^3 / (3 E I), which at rho = L7 + theta4 from
-pin 8 is a spring of 3 E I rho^2 / L_f^3 at joint 3.
-Bending out of the arm's plane, torsion of the links and the play of their pins are left out.
+At a joint without elasticity u takes the place of T_s + c (thetad - qd).
+
+T_s(theta - q) is the torque of the gearbox, with piecewise stiffness K1, K2, K3, in series with a
+torsional spring that represents the bending of the link. A force F at the end of a cantilever of
+length L deflects it by F L^3 / (3 E I), which is the angle F L^2 / (3 E I) seen from its root.
+
+- Pin 8 loads the inner link with a force only, so the link is a spring of 3 E I / L at joint 2.
+- The length L_f = clear + theta4 of the extension is outside its housing. It lets the wrist deflect
+  by F L_f^3 / (3 E I). At rho = L7 + theta4 from pin 8 this is a spring of 3 E I rho^2 / L_f^3 at
+  joint 3.
+
+Bending out of the arm's plane, torsion of the links and play of the pins are left out.
 """
 
 from collections.abc import Callable
@@ -38,26 +44,26 @@ from planner.control.figures import Figures
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """A boom with its drives' elasticity and friction; m joints are elastic."""
+    """Boom with the elasticity and friction of its drives. m joints are elastic."""
 
     boom: Boom
     figures: Figures
     elastic: tuple[int, ...]
     """Indices of the elastic joints."""
     rotor: Array
-    """(5,) N^2 (J_rotor + J_gear) [kg m^2], 0 where no drive gives it."""
+    """(5,) drive inertia N^2 (J_rotor + J_gear) at the joint [kg m^2]; 0 if it is not known."""
     stiffness: Array
-    """(m, 3) K1, K2, K3 of the gearboxes [Nm/rad]."""
+    """(m, 3) stiffness K1, K2, K3 of the gearboxes [Nm/rad]."""
     breaks: Array
-    """(m, 2) T1, T2 [Nm]."""
+    """(m, 2) torques T1, T2 at which the stiffness changes [Nm]."""
     gap: Array
-    """(m,) backlash [rad], 0 unless asked for."""
+    """(m,) backlash [rad]; 0 unless it is included."""
     damping: Array
-    """(m,) c [Nm s/rad]."""
+    """(m,) damping c [Nm s/rad]."""
     coulomb: Array
-    """(m,) N T_noload [Nm]: what turns the gearbox without a load."""
+    """(m,) no-load torque N T_noload of the gearbox [Nm]."""
     loss: Array
-    """(m,) 1 / eta - 1: further friction while driving, as a share of the load."""
+    """(m,) 1 / eta - 1, additional friction while driving divided by the load."""
     bends: bool
     """Whether inner link and extension bend."""
 
@@ -71,18 +77,24 @@ class Plant:
         backlash: bool = False,
         reference: Array | None = None,
     ) -> "Plant":
-        """The plant of a boom.
+        """Return the plant of a boom.
 
         Args:
-            figures: what is assumed; None takes every default.
-            elastic: whether gearboxes with a printed stiffness twist; without it the motors' inertia is the joint's.
-            bending: whether inner link and extension bend, each in series with its joint's gearbox.
-            backlash: whether the gearboxes have the play that their sheets print.
-            reference: joint position (5,) at which the lowest mode has the structural damping ratio; None is the middle of
-                the joints' ranges. c = 2 zeta K / omega_1 there (damping in proportion to stiffness).
+            boom: the boom.
+            figures: assumed figures; None takes every default.
+            elastic: whether gearboxes with a printed stiffness twist. If not, the inertia of the
+                drive is added to the joint.
+            bending: whether inner link and extension bend, in series with the gearbox.
+            backlash: whether the gearboxes have the backlash of their datasheets.
+            reference: joint position (5,) at which the lowest mode has the structural damping
+                ratio; None is the middle of the joint ranges. There c = 2 zeta K / omega_1
+                (damping proportional to stiffness).
+
+        Raises:
+            InfeasibleError: as `natural_frequencies`.
         """
         figures = Figures.of() if figures is None else figures
-        joints = [i for i, drive in enumerate(boom.drives) if elastic and drive is not None and _twists(drive)]
+        joints = [i for i, drive in enumerate(boom.drives) if elastic and drive is not None and _is_elastic(drive)]
         gears = [drive.gearbox for i in joints if (drive := boom.drives[i])]
         share, count = figures.friction_share, len(joints)
         plant = Plant(
@@ -107,12 +119,12 @@ class Plant:
         return replace(plant, damping=read_only(damping))
 
     def with_boom(self, boom: Boom) -> "Plant":
-        """The same drives, figures and damping on another boom: another payload, for example."""
+        """Return the plant with another boom, for example one with another payload."""
         return replace(self, boom=boom)
 
     @cached_property
     def columns(self) -> slice | list[int]:
-        """The elastic joints' columns of an array: a slice where they are neighbours, which NumPy takes ten times quicker."""
+        """Columns of the elastic joints: a slice if they are adjacent, which NumPy indexes faster."""
         first, count = self.elastic[0] if self.elastic else 0, len(self.elastic)
         neighbours = self.elastic == tuple(range(first, first + count))
         return slice(first, first + count) if neighbours else list(self.elastic)
@@ -129,46 +141,49 @@ class Plant:
 
     @cached_property
     def spans(self) -> Array:
-        """(2, m) T1 and T2 - T1: torque over the first and the second segment of a gearbox [Nm]."""
+        """(2, m) T1 and T2 - T1, the torques over the first two segments of a gearbox [Nm]."""
         return read_only([self.breaks[:, 0], self.breaks[:, 1] - self.breaks[:, 0]])
 
     @cached_property
     def rigid_inertia(self) -> Array:
-        """(5, 5) inertia of the drives that turn with their links: those of joints without elasticity."""
+        """(5, 5) inertia of the drives at joints without elasticity [kg m^2]."""
         stiff = self.rotor.copy()
         stiff[list(self.elastic)] = 0.0
         return read_only(np.diag(stiff))
 
     @cached_property
-    def joints_rub(self) -> bool:
-        """Whether the boom's joints have friction of their own."""
+    def has_joint_friction(self) -> bool:
+        """Whether the joints have friction besides that of their drives."""
         return bool(self.boom.friction.viscous.any() or self.boom.friction.coulomb.any())
 
     @property
     def limits(self) -> tuple[str, ...]:
-        """What is not known of this plant, a sentence each."""
+        """Limitations of this plant, a sentence each."""
         driven = [JOINTS[i] for i, drive in enumerate(self.boom.drives) if drive is not None]
         without = [joint for joint in JOINTS if joint not in driven]
         sentences = []
         if without:
             sentences.append(
-                f"{', '.join(without)}: no drive is given; simulated as a source of any torque without inertia, elasticity and "
-                "friction of its own, so what their drives can bear is NOT CHECKABLE"
+                f"{', '.join(without)}: no drive is given; simulated with unlimited torque and without inertia, elasticity and "
+                "friction of a drive, so the drive limits are NOT CHECKABLE"
             )
         rigid = [joint for joint in driven if JOINTS.index(joint) not in self.elastic]
         if rigid:
-            sentences.append(f"{', '.join(rigid)}: the gearbox does not twist here, and has no friction of its own")
+            sentences.append(f"{', '.join(rigid)}: the gearbox is simulated as rigid and without friction")
         return tuple(sentences)
 
 
-def _twists(drive: Drive) -> bool:
-    """Whether the sheets give all that an elastic joint needs."""
+def _is_elastic(drive: Drive) -> bool:
+    """Return whether the datasheets give all figures of an elastic joint."""
     gear = drive.gearbox
     return None not in (gear.torsion_stiffness, gear.torsion_torques, reflected_inertia(drive))
 
 
 def compliance(plant: Plant, q: Array) -> tuple[Array, Array]:
-    """Of the links behind each elastic joint [rad/Nm], (..., m), and its derivative by theta4 [rad/(Nm m)]."""
+    """Return the bending compliance C (..., m) [rad/Nm] behind each elastic joint, and dC/dtheta4.
+
+    The derivative is in rad/(Nm m).
+    """
     C, C_4 = np.zeros((*q.shape[:-1], len(plant.elastic))), np.zeros((*q.shape[:-1], len(plant.elastic)))
     if plant.bends:
         for column, joint in enumerate(plant.elastic):
@@ -184,14 +199,14 @@ def compliance(plant: Plant, q: Array) -> tuple[Array, Array]:
 
 
 def _segments(plant: Plant, C: Array) -> tuple[tuple[Array, Array, Array], Array, Array]:
-    """Stiffness of each segment in series with compliance C (..., m), and the twists at which they end."""
+    """Return the stiffnesses in series with compliance C (..., m), and the twists between them."""
     first, second, third = (1.0 / (softness + C) for softness in plant.softness)
     end_1 = plant.breaks[:, 0] / first
     return (first, second, third), end_1, end_1 + (plant.breaks[:, 1] - plant.breaks[:, 0]) / second
 
 
 def spring_torque(plant: Plant, q: Array, twist: Array, C: Array | None = None) -> Array:
-    """T_s (..., m) [Nm] at a twist theta - q (..., m) [rad]."""
+    """Compute T_s (..., m) [Nm] at a twist theta - q (..., m) [rad]."""
     C = compliance(plant, q)[0] if C is None else C
     soft_1, soft_2, soft_3 = (softness + C for softness in plant.softness)
     span_1, span_2 = plant.spans
@@ -206,7 +221,7 @@ def spring_torque(plant: Plant, q: Array, twist: Array, C: Array | None = None) 
 
 
 def twist_under(plant: Plant, q: Array, torque: Array) -> Array:
-    """Twist theta - q (..., m) [rad] under a torque (..., m) [Nm]: the inverse of `spring_torque`."""
+    """Compute the twist (..., m) [rad] at a torque (..., m) [Nm], inverting `spring_torque`."""
     C, size = compliance(plant, q)[0], np.abs(torque)
     (k1, k2, k3), _, _ = _segments(plant, C)
     low, high = plant.breaks[:, 0], plant.breaks[:, 1]
@@ -216,7 +231,7 @@ def twist_under(plant: Plant, q: Array, torque: Array) -> Array:
 
 
 def spring_energy(plant: Plant, q: Array, twist: Array) -> Array:
-    """Energy (...) [J] in all springs: the integral of T_s over the twist."""
+    """Compute the energy (...) [J] of all springs, the integral of T_s over the twist."""
     (k1, k2, k3), end_1, end_2 = _segments(plant, compliance(plant, q)[0])
     x = np.maximum(np.abs(twist) - 0.5 * plant.gap, 0.0)
     a, b, c = np.minimum(x, end_1), np.clip(x - end_1, 0.0, end_2 - end_1), np.maximum(x - end_2, 0.0)
@@ -226,7 +241,7 @@ def spring_energy(plant: Plant, q: Array, twist: Array) -> Array:
 
 
 def tangent_stiffness(plant: Plant, q: Array, torque: Array) -> Array:
-    """dT_s/d(twist) (..., m) [Nm/rad] at a torque (..., m)."""
+    """Compute dT_s/d(twist) (..., m) [Nm/rad] at a torque (..., m) [Nm]."""
     (k1, k2, k3), _, _ = _segments(plant, compliance(plant, q)[0])
     size = np.abs(torque)
     stiffness: Array = np.where(size < plant.breaks[:, 0], k1, np.where(size < plant.breaks[:, 1], k2, k3))
@@ -234,42 +249,45 @@ def tangent_stiffness(plant: Plant, q: Array, torque: Array) -> Array:
 
 
 def tangent_at_rest(plant: Plant, q: Array) -> Array:
-    """`tangent_stiffness` under the torque that holds the boom still, (..., m)."""
+    """Compute `tangent_stiffness` (..., m) at the gravity torque."""
     return tangent_stiffness(plant, q, gravity_torque(plant.boom, q)[..., list(plant.elastic)])
 
 
 def natural_frequencies(plant: Plant, q: Array, stiffness: Array | None = None) -> Array:
-    """Frequencies (m,) [Hz] with the motors and all rigid joints held, lowest first.
+    """Compute the natural frequencies (m,) [Hz], lowest first, with motors and rigid joints fixed.
 
-    det(K + dg/dq - omega^2 M) = 0 over the elastic joints, at q (5,).
+    det(K + dg/dq - omega^2 M) = 0 for the elastic joints.
 
     Args:
-        stiffness: K (m,) [Nm/rad]; None is the tangent under the torque that holds the boom still.
+        plant: the plant.
+        q: joint position (5,).
+        stiffness: K (m,) [Nm/rad]; None is the tangent stiffness at the gravity torque.
 
     Raises:
         InputError: no joint is elastic.
-        InfeasibleError: the boom's weight topples it on its elastic joints.
+        InfeasibleError: the elastic joints are too soft to carry the weight of the boom.
     """
     if not plant.elastic:
-        raise InputError("no joint is elastic: nothing swings")
+        raise InputError("no joint is elastic, so there are no natural frequencies")
     E = list(plant.elastic)
     K = np.diag(tangent_at_rest(plant, q) if stiffness is None else stiffness) + gravity_stiffness(plant.boom, q)[np.ix_(E, E)]
     squares = np.linalg.eigvals(np.linalg.solve(mass_matrix(plant.boom, q)[np.ix_(E, E)], K))
     if not squares.real.min() > 0.0:
-        raise InfeasibleError(
-            "the boom's weight topples it on its elastic joints, motors held: gearboxes or links are too soft"
-        )
+        raise InfeasibleError("the boom is unstable under its weight with the motors fixed: gearboxes or links are too soft")
     frequencies: Array = np.sqrt(np.sort(squares.real)) / (2.0 * np.pi)
     return frequencies
 
 
 def gravity_stiffness(boom: Boom, q: Array) -> Array:
-    """dg/dq (5, 5), by the central difference of sixth order: exact to some 1e-12 for this sum of sines."""
-    return slopes(lambda x: gravity_torque(boom, x), q)
+    """Compute dg/dq (5, 5). The relative error is some 1e-12, because g is a sum of sines."""
+    return jacobian(lambda x: gravity_torque(boom, x), q)
 
 
-def slopes(f: Callable[[Array], Array], x: Array, h: float = 1e-2) -> Array:
-    """df/dx (k, n) of f: (..., n) -> (..., k) at x (n,), by the central difference of sixth order, in one call of f."""
+def jacobian(f: Callable[[Array], Array], x: Array, h: float = 1e-2) -> Array:
+    """Compute df/dx (k, n) of f: (..., n) -> (..., k) at x (n,), with step h.
+
+    A central difference of sixth order, in one call of f.
+    """
     weights = np.array([3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0]) / h
     shifts = h * np.arange(1.0, 4.0)[:, None, None] * np.eye(x.size)
     values = f(np.stack([x + shifts, x - shifts]))
@@ -278,12 +296,17 @@ def slopes(f: Callable[[Array], Array], x: Array, h: float = 1e-2) -> Array:
 
 
 def friction(plant: Plant, speed: Array, load: Array) -> Array:
-    """F (..., m) [Nm] of the gearboxes at motor speed (..., m) [rad/s, at the joint] under the load T_s (..., m).
+    """Compute the friction F (..., m) [Nm] of the gearboxes.
 
         F = tanh(speed / v) (N T_noload + (1 / eta - 1) max(T_s sign(speed), 0))
 
-    as `motor_torque` while driving. While braking the no-load torque alone helps to brake. tanh stands for the sign, so
-    friction creeps below v and does not stick.
+    While driving this is the friction of `motor_torque`. While braking only the no-load torque
+    helps to brake. tanh replaces the sign, so friction does not stick but creeps below v.
+
+    Args:
+        plant: the plant.
+        speed: motor speed (..., m) at the joint [rad/s].
+        load: T_s (..., m) [Nm].
     """
     direction = np.tanh(speed / np.radians(plant.figures.stick_deg_s))
     torque: Array = direction * (plant.coulomb + plant.loss * np.maximum(load * np.sign(speed), 0.0))
@@ -301,12 +324,17 @@ def accelerations(
     base: BaseMotion | None = None,
     tip_force: Array | None = None,
 ) -> tuple[Array, Array]:
-    """qdd (B, 5) and thetadd (B, m) of B boom states under drive torques u (B, 5), at the joints' side of the gears.
+    """Compute qdd (B, 5) and thetadd (B, m) of B states of the plant.
 
     Args:
-        q, qd: (B, 5); theta, theta_d: (B, m), at the joints' side of the gears.
-        base: the vehicle's motion, each entry (3,).
-        tip_force: (3,) or (B, 3) of the surroundings on the tip [N].
+        plant: the plant.
+        q: joint position (B, 5).
+        qd: joint velocity (B, 5).
+        theta: motor position (B, m) at the joint side of the gears.
+        theta_d: motor velocity (B, m) at the joint side of the gears.
+        u: drive torque (B, 5) [Nm] at the joint side of the gears.
+        base: motion of the vehicle, each entry (3,); None is at rest on level ground.
+        tip_force: external force (3,) or (B, 3) on the tip [N].
 
     Raises:
         InputError: a state is not finite.
@@ -319,10 +347,10 @@ def accelerations(
         load = spring_torque(plant, q, theta - q[:, E], C)
         passed = load + plant.damping * (theta_d - qd[:, E])
         tau[:, E] = passed
-        # A bent extension pushes itself out: so the energy is kept.
+        # A bent extension pushes outwards; this conserves the energy.
         tau[:, 3] += 0.5 * np.einsum("bm,bm,bm->b", load, load, C_4)
         thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.elastic_rotor
-    if plant.joints_rub:
+    if plant.has_joint_friction:
         direction = np.tanh(qd / np.radians(plant.figures.stick_deg_s))
         tau -= boom.friction.viscous * qd + boom.friction.coulomb * direction
     M, bias = mass_matrix_and_bias(boom, q, qd, base=base, tip_force=tip_force)
@@ -331,16 +359,19 @@ def accelerations(
 
 
 def equilibrium(plant: Plant, theta: Array, base: BaseMotion | None = None) -> Array:
-    """Joint position q (B, 5) at which the boom hangs still from motors at theta (B, 5): q = theta - twist(g(q))."""
+    """Solve q = theta - twist(g(q)) for the static joint position q (B, 5), theta (B, 5)."""
     q, E = theta.copy(), list(plant.elastic)
     if E:
-        for _ in range(20):  # a contraction by g' / K, some 1e-3
+        for _ in range(20):  # fixed-point iteration; each step reduces the error by g' / K, some 1e-3
             q[:, E] = theta[:, E] - twist_under(plant, q, gravity_torque(plant.boom, q, base=base)[:, E])
     return q
 
 
 def torque_limits(plant: Plant, speed: Array) -> Array:
-    """N T_available(N speed) (..., 5) [Nm] at motor speed (..., 5) [rad/s, at the joint]; infinite where it is not known."""
+    """Compute N T_available(N speed) (..., 5) [Nm]; infinite where it is not known.
+
+    `speed` (..., 5) [rad/s] is the motor speed at the joint.
+    """
     limits = np.full(speed.shape, np.inf)
     for i, drive in enumerate(plant.boom.drives):
         if drive is None:

@@ -1,4 +1,7 @@
-"""Input shapers: a command convolved with impulses that cancel the vibration of one mode (Singer and Seering, 1990)."""
+"""Input shapers: a command is convolved with impulses that cancel the vibration of one mode.
+
+Source: Singer and Seering, 1990.
+"""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,7 +13,7 @@ from boom_model.errors import InputError
 
 
 class Shaper(StrEnum):
-    """Which impulses."""
+    """Kind of input shaper."""
 
     NONE = "none"
     ZV = "zv"
@@ -19,22 +22,34 @@ class Shaper(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Impulses:
-    """A shaper: amplitudes that sum to 1, at times from 0 on; the command ends later by the last of them."""
+    """Impulses of an input shaper. The first is at time 0 and the amplitudes sum to 1.
+
+    The command ends later by the time of the last impulse.
+    """
 
     times: Array
-    """(k,) [s]"""
+    """(k,) times [s]."""
     amplitudes: Array
-    """(k,)"""
+    """(k,) amplitudes."""
 
 
 def impulses(shaper: Shaper, frequency: float, damping: float) -> Impulses:
-    """The shaper of a mode of natural `frequency` [Hz] and `damping` ratio.
+    """Compute the impulses of a shaper for one mode.
 
-    With K = exp(-zeta pi / sqrt(1 - zeta^2)) and half a damped period D: ZV is (1, K) / (1 + K) at 0, D; ZVD is
-    (1, 2 K, K^2) / (1 + K)^2 at 0, D, 2 D, and bears an error in the frequency better.
+    With K = exp(-zeta pi / sqrt(1 - zeta^2)) and D half a damped period:
+
+        ZV    (1, K) / (1 + K) at 0, D
+        ZVD   (1, 2 K, K^2) / (1 + K)^2 at 0, D, 2 D
+
+    ZVD is less sensitive to an error in the frequency.
+
+    Args:
+        shaper: kind of shaper.
+        frequency: natural frequency of the mode [Hz].
+        damping: damping ratio zeta of the mode.
 
     Raises:
-        InputError: the frequency is not above 0, or the damping not in [0, 1).
+        InputError: the frequency is not above 0, or the damping is not in [0, 1).
     """
     frequency, damping = scalar("frequency", frequency), scalar("damping", damping)
     if not frequency > 0.0:
@@ -48,7 +63,7 @@ def impulses(shaper: Shaper, frequency: float, damping: float) -> Impulses:
 
 
 def residual(shaped: Impulses, frequency: float, damping: float) -> float:
-    """Vibration of a mode after the last impulse, as a share of that after a single impulse of size 1.
+    """Compute the vibration of a mode after the last impulse, relative to a single unit impulse.
 
     V = exp(-zeta w t_k) |sum_j A_j exp(zeta w t_j) exp(i w sqrt(1 - zeta^2) t_j)|
     """

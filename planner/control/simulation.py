@@ -1,4 +1,4 @@
-"""Motion under given joint torques, by numerical integration of the rigid boom."""
+"""Simulation of the rigid boom under given joint torques."""
 
 from collections.abc import Callable
 
@@ -27,18 +27,26 @@ def simulate(
     rtol: float = 1e-9,
     atol: float = 1e-10,
 ) -> Trajectory:
-    """The motion from state q, qd (5,) under `torque`, at times t (n,), by the explicit Runge-Kutta method of order 8.
+    """Simulate the motion from a state with the explicit Runge-Kutta method of order 8.
 
-    Position limits do not stop it: what the motion does beyond them is for `check` to say.
+    Position limits do not stop the motion; `check` reports whether it exceeds them.
 
     Args:
-        base: the vehicle's motion at a time, each entry (3,); None rests on level ground.
-        friction, drive_inertia: as in `inverse_dynamics`.
-        rtol, atol: the integrator's tolerances on q and qd.
+        boom: the boom.
+        q: initial joint position (5,).
+        qd: initial joint velocity (5,).
+        torque: joint torque as a function of time and state.
+        t: times (n,) of the samples [s]; the simulation starts at the first.
+        base: motion of the vehicle as a function of time, each entry (3,); None is at rest on
+            level ground.
+        friction: as in `inverse_dynamics`.
+        drive_inertia: as in `inverse_dynamics`.
+        rtol: relative tolerance of the integrator on q and qd.
+        atol: absolute tolerance of the integrator on q and qd.
 
     Raises:
-        InputError: not finite, of the wrong shape, or times that do not increase.
-        InfeasibleError: the integrator gave up; carries its message.
+        InputError: an input is not finite or has the wrong shape, or the times do not increase.
+        InfeasibleError: the integrator failed; the message contains its reason.
     """
     from scipy.integrate import solve_ivp
 
@@ -46,7 +54,7 @@ def simulate(
     start = np.concatenate([checked("q", q, 5), checked("qd", qd, 5)])
     if start.shape != (10,) or t.ndim != 1 or t.size < 2 or (np.diff(t) <= 0.0).any():
         raise InputError(
-            f"q and qd must be (5,), and t (n,) increasing with n >= 2; q and qd make {start.shape}, t is {t.shape}"
+            f"q and qd must be (5,), and t (n,) increasing with n >= 2; together q and qd are {start.shape}, t is {t.shape}"
         )
 
     def accelerations(time: float, state: Array) -> Array:
@@ -59,7 +67,7 @@ def simulate(
 
     found = solve_ivp(slope, (t[0], t[-1]), start, method="DOP853", t_eval=t, rtol=rtol, atol=atol)
     if not found.success:
-        raise InfeasibleError(f"the simulation ended at {found.t[-1] if found.t.size else t[0]:g} s: {found.message}")
+        raise InfeasibleError(f"the simulation stopped at {found.t[-1] if found.t.size else t[0]:g} s: {found.message}")
     states = found.y.T
     qdd = np.stack([accelerations(time, state) for time, state in zip(t, states, strict=True)])
     return Trajectory.from_samples(t, states[:, :5], states[:, 5:], qdd)

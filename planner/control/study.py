@@ -1,4 +1,4 @@
-"""How well a boom follows its plan: every move, controller and shaper side by side, measured and reported."""
+"""Study of the tracking error for every combination of move, controller and shaper."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -22,11 +22,11 @@ from planner.reports.markdown import section, table
 from planner.reports.report import assumptions
 
 POSES = 9
-"""Poses along a move at which the loop's poles are computed."""
+"""Number of poses along a move at which the poles of the loop are computed."""
 
 
 class Outcome(StrEnum):
-    """What became of a case."""
+    """Outcome of a case."""
 
     FOLLOWS = "follows"
     SATURATES = "saturates"
@@ -35,11 +35,12 @@ class Outcome(StrEnum):
 
 
 FAILED = (Outcome.UNSTABLE, Outcome.LOST_STEP)
+"""Outcomes with which a study fails."""
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What is simulated beside the moves themselves."""
+    """Settings of a study."""
 
     goals: Goals = field(default_factory=Goals)
     figures: Figures = field(default_factory=Figures)
@@ -48,95 +49,97 @@ class Setup:
     backlash: bool = False
     compensate_sag: bool = False
     payload_error: float = 0.0
-    """True payload less the one that plan and controllers believe in [kg]."""
+    """True payload minus the payload that planning and controllers assume [kg]."""
     vehicle: VehicleCase | None = None
     gust: Gust | None = None
     hold: float = 2.0
-    """Simulated after the end of the longest command [s]."""
+    """Simulated time after the end of the longest command [s]."""
     settled: float = 1e-3
-    """Distance of the tip [m] within which it counts as settled."""
+    """Distance from the final position [m] within which the tip counts as settled."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """How one controller followed one command, in SI. Figures that a diverged case does not have are None."""
+    """Result of one controller on one command, in SI. Figures of a diverged case are None."""
 
     profile: str
     controller: str
     shaper: str
     duration_s: float
-    """Of the command, the shaper's delay included."""
+    """Duration of the command, including the shaper's delay."""
     outcome: Outcome
     reason: str
-    """Why the outcome is not FOLLOWS; empty otherwise."""
+    """Reason why the outcome is not FOLLOWS; empty otherwise."""
     tip_error_peak_m: float | None
-    """Largest distance of the tip from where the command wants it, until the end of the simulation."""
+    """Largest distance of the tip from its command, until the end of the simulation."""
     tip_error_rms_m: float | None
-    """Until the end of the command."""
+    """RMS distance of the tip from its command, until the end of the command."""
     tip_error_end_m: float | None
-    """At the end of the simulation: the sag of an elastic boom, above all."""
+    """Tip error at the end of the simulation, mainly the sag of an elastic boom."""
     joint_error_peak: tuple[float, ...] | None
     joint_error_rms: tuple[float, ...] | None
     overshoot: float | None
-    """Largest of all joints that move, beyond where it comes to rest, as a share of its way."""
+    """Largest overshoot of a joint beyond its final position, divided by its travel."""
     settling_s: float | None
-    """From the command's end until the tip stays within `settled` of where it comes to rest; None if it does not."""
+    """Time from the end of the command until the tip stays settled; None if it does not settle."""
     residual_vibration_m: float | None
-    """Largest departure of the tip, after the command's end, from its mean over one period of the lowest mode."""
+    """Largest deviation of the tip, after the end, from its mean over one lowest-mode period."""
     peak_torque_ratio: float | None
-    """Largest |torque asked| / torque that the motor has at its speed, of the joints where that is known."""
+    """Largest |torque command| / torque of the motor at its speed, where that is known."""
     saturated_share: float
-    """Share of the samples, until a case diverged, at which some motor was asked for more than it has."""
+    """Share of the samples, until a case diverged, at which a motor is saturated."""
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """A controller's loop at the goal, and its poles along the move."""
+    """Loop of a controller at the goal, and its largest pole along the move."""
 
     controller: Controller
     loop: Loop
     largest_pole: float
-    """Size of the largest sampled pole at POSES poses of the first move."""
+    """Largest magnitude of a discrete-time pole at POSES poses of the first move."""
 
     @property
     def stable(self) -> bool:
+        """Whether the loop is stable at the goal and along the move."""
         return self.loop.stable and self.largest_pole <= 1.0 + 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """What was simulated, and what came of it."""
+    """Simulated cases and their results."""
 
     boom: Boom
     setup: Setup
     rows: tuple[Row, ...]
     designs: tuple[Design, ...]
     modes_Hz: tuple[float, ...]
-    """Natural frequencies at the goal with the motors held, at the stiffness under the boom's weight."""
+    """Natural frequencies at the goal; motors fixed, tangent stiffness under gravity."""
     gearbox_Hz: tuple[float, ...]
-    """Likewise of rigid links on gearboxes of stiffness K1, the hand estimate."""
+    """Natural frequencies with rigid links and gearboxes of stiffness K1, as estimated by hand."""
     impulses: tuple[Impulses, ...]
-    """Of each shaper."""
+    """Impulses of each shaper."""
     run: Run
     tip_error: Array
-    """(n, B) [m]"""
+    """(n, B) distance of the tip from its command [m]."""
     notes: tuple[str, ...]
     assumptions: tuple[str, ...]
 
     @property
     def failed(self) -> bool:
+        """Whether any case failed."""
         return any(row.outcome in FAILED for row in self.rows)
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """What became of the cases that do not follow their command, a sentence each."""
+        """Reason for each case that does not follow its command."""
         return tuple(f"{row.profile}, {row.controller}, shaper {row.shaper}: {row.reason}" for row in self.rows if row.reason)
 
     @property
     def leading(self) -> tuple[Row, ...]:
-        """The cases to look at first: up to six that fail, and of each profile the one that shakes and errs least.
+        """Most relevant cases: up to six that failed, and the least RMS error of each profile.
 
-        All of them where there are no more than eight.
+        These are all cases if there are at most eight.
         """
         if len(self.rows) <= 8:
             return self.rows
@@ -150,12 +153,12 @@ class Study:
 
     @property
     def summary(self) -> str:
-        """How many cases came to what."""
+        """Number of cases with each outcome."""
         counts = {o: sum(row.outcome is o for row in self.rows) for o in Outcome}
         return "; ".join(f"{count} of {len(self.rows)} cases: {outcome}" for outcome, count in counts.items() if count)
 
     def to_json(self, files: dict[str, str]) -> dict[str, Any]:
-        """The JSON object of `boom control`, in SI."""
+        """Return the JSON object of `boom control`, in SI."""
         return {
             "ok": not self.failed,
             "cases": [asdict(row) for row in self.rows],
@@ -177,11 +180,11 @@ class Study:
         }
 
     def to_markdown(self) -> str:
-        """The report as Markdown, in people's units."""
+        """Return the report as Markdown, in displayed units."""
         lines = [f"# {self.summary}", "", self.modes_sentence, ""]
         lines += [*table(ROW_HEADER, map(row_cells, self.rows)), "", ROW_LEGEND]
         if self.designs:
-            lines += ["", "## Loops at the goal, each joint's broken with the others closed", ""]
+            lines += ["", "## Loops at the goal, each opened with the others closed", ""]
             lines += table(LOOP_HEADER, [cells for design in self.designs for cells in loop_cells(design)])
         for title, texts in (("Cases", self.reasons), ("Notes", self.notes), ("Assumed", self.assumptions)):
             lines += section(title, texts)
@@ -189,11 +192,11 @@ class Study:
 
     @property
     def modes_sentence(self) -> str:
-        """The natural frequencies for people."""
+        """Natural frequencies in a sentence."""
         if not self.modes_Hz:
-            return "No joint is elastic: nothing swings"
+            return "No joint is elastic, so there are no natural frequencies"
         shown, gears = (", ".join(f"{f:.2f}" for f in each) for each in (self.modes_Hz, self.gearbox_Hz))
-        return f"Natural frequencies at the goal, motors held: {shown} Hz (rigid links, gearboxes of stiffness K1: {gears} Hz)"
+        return f"Natural frequencies at the goal, motors fixed: {shown} Hz (rigid links, gearboxes of stiffness K1: {gears} Hz)"
 
 
 def study(
@@ -204,17 +207,23 @@ def study(
     setup: Setup | None = None,
     track: Track = iter,
 ) -> Study:
-    """Follows every move with every controller and shaper, and measures what comes of it.
+    """Simulate every move with every controller and shaper, and evaluate the tracking error.
 
-    The shapers are made for the lowest mode at the first move's goal, motors held, with the structural damping ratio.
+    The shapers are designed for the lowest mode at the goal of the first move, with the motors
+    fixed and the structural damping ratio.
 
     Args:
-        track: iterates over the controllers' periods, and may show how far it is.
+        boom: the boom that planning and controllers assume.
+        moves: the planned moves.
+        controllers: the controllers.
+        shapers: the input shapers.
+        setup: settings; None takes every default.
+        track: iterates over the sampling periods, and may show progress.
 
     Raises:
-        InputError: nothing to simulate, a payload below 0, a gust outside the time simulated, or a shaper for a plant in which
-            no joint is elastic.
-        InfeasibleError: the boom's weight topples it on its elastic joints.
+        InputError: there is nothing to simulate, the payload is negative, the gust is outside the
+            simulated time, or a shaper is given although no joint is elastic.
+        InfeasibleError: as `natural_frequencies`.
     """
     setup = Setup() if setup is None else setup
     if not (moves and controllers and shapers):
@@ -225,7 +234,7 @@ def study(
     plant = model.with_boom(true)
     modes, gearbox = _modes(plant, goal)
     if not modes and set(shapers) != {Shaper.NONE}:
-        raise InputError("no joint is elastic: there is no mode to shape a command for")
+        raise InputError("no joint is elastic, so an input shaper has no mode to suppress")
     shaped = {s: impulses(s, _modes(model, goal)[0][0] if modes else 1.0, setup.figures.structural_damping) for s in shapers}
     cases, names = [], []
     for move in moves:
@@ -341,15 +350,18 @@ def _outcome(run: Run, b: int, design: Design | None, saturated: float) -> tuple
     lost = run.lost[b]
     if not np.isnan(lost).all():
         i = int(np.nanargmin(lost))
-        return Outcome.LOST_STEP, f"{JOINTS[i]}'s motor loses its first step at {lost[i]:.3f} s"
+        return Outcome.LOST_STEP, f"{JOINTS[i]}: the motor loses its first step at {lost[i]:.3f} s"
     if not np.isnan(run.ended[b]):
-        said = f"out of control at {run.ended[b]:.3f} s"
-        return Outcome.UNSTABLE, said + (f", with its motors saturated {saturated:.1%} of the time" if saturated else "")
+        reason = f"diverges at {run.ended[b]:.3f} s"
+        return Outcome.UNSTABLE, reason + (f", with a motor saturated for {saturated:.1%} of the time" if saturated else "")
     if design is not None and not design.stable:
-        return Outcome.UNSTABLE, f"a sampled pole of size {max(design.largest_pole, design.loop.largest):.6f} on the way"
+        return (
+            Outcome.UNSTABLE,
+            f"discrete-time pole of magnitude {max(design.largest_pole, design.loop.largest):.6f} along the move",
+        )
     if saturated > 0.0:
         i = int((np.abs(run.torque[:, b]) / run.limit[:, b]).max(axis=0).argmax())
-        return Outcome.SATURATES, f"{JOINTS[i]}'s motor is asked for more than it has; saturated {saturated:.1%} of the time"
+        return Outcome.SATURATES, f"{JOINTS[i]}: the motor is saturated for {saturated:.1%} of the time"
     return Outcome.FOLLOWS, ""
 
 
@@ -363,7 +375,7 @@ def _overshoot(q: Array, command: Array, last: int) -> float:
 
 
 def _residual(off: Array, window: int) -> float:
-    """Largest |off - moving mean of off over one period| (n, 3): slow creep has no part in it."""
+    """Return the largest |off - moving mean of off|, off (n, 3). The mean removes slow creep."""
     if len(off) <= window:
         return 0.0
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(off, axis=0)])
@@ -379,33 +391,31 @@ def _notes(plant: Plant, setup: Setup, controllers: Sequence[Controller]) -> tup
         notes.append(f"given: {', '.join(given)}")
     if plant.bends and plant.elastic:
         notes.append(
-            "inner link and extension bend in the arm's plane, as torsional springs behind the gearboxes; sideways bending, "
-            "the other links and the pins are rigid"
+            "inner link and extension bend in the arm's plane, as torsional springs behind the gearboxes; they are rigid "
+            "sideways, and the other links and the pins are rigid"
         )
     if plant.elastic and not plant.gap.any():
         notes.append("backlash and hysteresis of the gearboxes are left out")
     elif plant.elastic:
         notes.append("hysteresis of the gearboxes is left out")
     if setup.payload_error:
-        believed = plant.boom.payload.mass - setup.payload_error
-        notes.append(f"the true payload is {plant.boom.payload.mass:g} kg; plan and controllers believe in {believed:g} kg")
+        assumed = plant.boom.payload.mass - setup.payload_error
+        notes.append(f"the true payload is {plant.boom.payload.mass:g} kg; planning and controllers assume {assumed:g} kg")
     if setup.vehicle is not None:
-        notes.append(f"{setup.vehicle.sentence}; the controllers know its slope alone")
+        notes.append(f"{setup.vehicle.sentence}; the controllers know the slope only")
     if setup.gust is not None:
         gust = setup.gust
-        notes.append(f"gust on the tip: {gust.force} N at most, from {gust.start:g} s for {gust.duration:g} s (given)")
+        notes.append(f"gust on the tip: at most {gust.force} N, from {gust.start:g} s for {gust.duration:g} s (given)")
     goals = setup.goals
     if set(controllers) != {Controller.STEPPER}:
         notes.append(
             f"loops designed for poles at {goals.bandwidth_Hz:g} Hz with damping {goals.damping:g}, "
-            f"integral action at {goals.integral:g} of that"
+            f"integral action at {goals.integral:g} times this frequency"
         )
     if setup.compensate_sag:
-        notes.append("the motors are sent ahead by the twist that the believed weight gives")
+        notes.append("the motor references compensate the twist under the assumed weight")
     if Controller.STEPPER in controllers:
-        notes.append(
-            "stepper: open loop, so it has no margins; the joints without a drive follow by pd with full feedforward meanwhile"
-        )
+        notes.append("stepper: open loop without margins; joints without a drive use pd with full feedforward")
     return tuple(notes)
 
 
@@ -417,7 +427,7 @@ ROW_HEADER = (
     "tip mm",
     "rms mm",
     "rest mm",
-    "shakes mm",
+    "vibr. mm",
     "over",
     "settles s",
     "torque",
@@ -428,14 +438,14 @@ LOOP_HEADER = ("controller", "joint", "gain margin dB", "less gain dB", "phase m
 
 
 ROW_LEGEND = (
-    "tip: its largest error, RMS until the command ends, and what stays at rest (sag); shakes: residual vibration after the "
-    "command's end; over: overshoot of a joint; settles: after that end; torque: largest share of what the motor "
-    "has at its speed, where that is known"
+    "tip, rms, rest: largest tip error, RMS until the end of the command, and error at rest (sag); vibr.: residual "
+    "vibration after the end of the command; over: largest overshoot of a joint; settles: time from the end of the command; "
+    "torque: largest torque command divided by the motor's torque at its speed, if known"
 )
 
 
 def row_cells(row: Row) -> tuple[str, ...]:
-    """A case for people, under ROW_HEADER."""
+    """Return a case as text, in the columns of ROW_HEADER."""
     millimetres = (row.tip_error_peak_m, row.tip_error_rms_m, row.tip_error_end_m, row.residual_vibration_m)
     return (
         row.profile,
@@ -451,7 +461,7 @@ def row_cells(row: Row) -> tuple[str, ...]:
 
 
 def loop_cells(design: Design) -> list[tuple[str, ...]]:
-    """A controller's loops for people, under LOOP_HEADER."""
+    """Return the loops of a controller as text, in the columns of LOOP_HEADER."""
 
     def shown(value: float | None, digits: int = 1) -> str:
         return "-" if value is None else f"{value:.{digits}f}"

@@ -1,23 +1,25 @@
-"""The boom in other tools' forms: URDF, and MJCF for MuJoCo.
+"""Models of the boom for other tools: URDF, and MJCF for MuJoCo.
 
-Links have the frames of the DH tables (`boom_model.kinematics.frames.BODY_FRAMES`), every joint turns about or slides along
-its own z axis, and the five joints have their names and coordinates.
+Links have the frames of the DH tables (`boom_model.kinematics.frames.BODY_FRAMES`). Every joint
+turns about or slides along its own z axis. The five joints keep their names and coordinates.
 
-MJCF has the linkage with its loop, cut open at pin 7 and closed again by a `connect` constraint:
+MJCF has the linkage as a loop, cut open at pin 7 and closed again by a `connect` constraint:
 
     mount -yaw- base -lower- lower -pin 6- outer
                 base -inner- inner -pin 8- upper -extension- extension -wrist- end_effector - tip
 
-URDF knows trees alone. There the loop is cut at pin 8, and two massless links, level_6 and level_7, stay parallel to the base,
-so that each of the pins 6 and 7 is two joints that follow one joint each:
+URDF allows trees only. There the loop is cut at pin 8. Two massless links, level_6 and level_7,
+stay parallel to the base. Thus each of the pins 6 and 7 consists of two joints, each of which
+follows a single joint:
 
     mount -yaw- base -inner- inner
                 base -lower- lower -pin 6- outer -pin 7- upper -extension- extension -wrist- end_effector - tip
 
-With x = G q, G the multipliers of its <mimic> elements, the torques of the tree give those of the linkage as
-tau = G^T tau_tree: what a tool computes for a joint that mimics another belongs to that other one.
+Let G be the matrix of the <mimic> multipliers, so that the tree's coordinates are x = G q. The
+joint torques of the linkage are tau = G^T tau_tree: a torque that a tool computes for a mimic joint
+belongs to the joint that it mimics.
 
-Solids are drawn along the links for the eye; their thickness is not the boom's.
+The solids along the links are for display only; their thickness is not that of the boom.
 """
 
 from collections.abc import Mapping
@@ -38,12 +40,12 @@ from planner.files import replacing
 from planner.reports.report import assumptions
 
 UNLIMITED_EFFORT = 1e6
-"""URDF must have an effort limit [Nm, the extension's N]; this stands where no drive is given."""
+"""Effort limit [Nm, N for the extension] of a joint without a drive. URDF requires a limit."""
 
 FORMS = (".urdf", ".xml")
 
-_STEEL = 7850.0  # [kg/m^3]: the payload is drawn as a ball of steel
-_DRAWN = "Solids are drawn along the links, not measured. Masses, centres of mass and inertias are the boom's own."
+_STEEL = 7850.0  # [kg/m^3], density of the ball that is drawn for the payload
+_DRAWN = "The solids are for display and not measured. Masses, centres of mass and inertias are those of the boom."
 _COLORS = {
     "base": (0.60, 0.60, 0.60),
     "lower": (0.94, 0.89, 0.26),
@@ -57,34 +59,35 @@ _COLORS = {
 
 
 def write_model(boom: Boom, path: str | Path) -> None:
-    """The boom as a file of the form that its name ends with: .urdf, or .xml for MJCF.
+    """Write the boom as URDF (a name that ends in .urdf) or MJCF (.xml).
 
     Raises:
-        InputError: another ending, the file cannot be written, or as `mjcf`.
+        InputError: the name has another ending, the file cannot be written, or as `mjcf`.
     """
     form = Path(path).suffix.lower()
     if form not in FORMS:
-        raise InputError(f"{path}: a boom is written as .urdf, or as .xml for MuJoCo")
+        raise InputError(f"{path}: the name of a boom's model must end in .urdf, or in .xml for MuJoCo")
     text = urdf(boom) if form == ".urdf" else mjcf(boom)
     with replacing(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
 
 
 def urdf(boom: Boom) -> str:
-    """The boom as URDF: a tree, in which the parallelogram is kept by mimic joints.
+    """Return the boom as URDF, a tree in which mimic joints represent the parallelogram.
 
-    Position and velocity limits are the boom's. Effort limits are what the drives allow at rest with their margin, and
-    UNLIMITED_EFFORT where no drive is given. Each of the five joints has a transmission, which makes it an actuator in Drake
-    and ros_control; its ratio is 1, because efforts are the joint's own. The coupled limit of lower - inner and the drives'
-    reflected inertia have no place in URDF.
+    Position and velocity limits are those of the boom. An effort limit is the torque that the drive
+    allows at rest with its margin, or UNLIMITED_EFFORT without a drive. Each of the five joints has
+    a transmission, so Drake and ros_control treat it as an actuator. Its ratio is 1, because
+    efforts are joint torques. URDF cannot represent the coupled limit of lower - inner or the
+    reflected inertia of the drives.
     """
     top = Element("robot", name=boom.name)
     for text in (
-        "URDF cannot close a loop: the linkage is cut open at pin 8, between inner and upper link. The links level_6 and "
-        "level_7, without mass, stay parallel to the base, because the joints at pins 6 and 7 mimic lower and inner.",
+        "URDF cannot close a loop. The linkage is cut open at pin 8, between the inner and the upper link. The massless "
+        "links level_6 and level_7 stay parallel to the base, because the joints at pins 6 and 7 mimic lower and inner.",
         "A torque that a tool computes for a mimic joint belongs to the joint it mimics: add it there, times the multiplier.",
-        f"Coupled limit, which URDF cannot hold: lower - inner at least {boom.limits.linkage:.6g} rad.",
-        f"An effort of {UNLIMITED_EFFORT:.0f} says that no drive is given.",
+        f"URDF cannot represent the coupled limit: lower - inner is at least {boom.limits.linkage:.6g} rad.",
+        f"An effort of {UNLIMITED_EFFORT:.0f} means that the joint has no drive.",
         *_remarks(boom),
     ):
         top.append(ElementTree.Comment(f" {text} "))
@@ -100,13 +103,15 @@ def urdf(boom: Boom) -> str:
 
 
 def mjcf(boom: Boom) -> str:
-    """The boom as MJCF, its loop closed at pin 7 by a `connect` constraint.
+    """Return the boom as MJCF, with its loop closed at pin 7 by a `connect` constraint.
 
-    Each joint has a motor, whose control is the joint's torque [Nm, the extension's N], limited to what its drive allows at
-    rest with its margin, where one is given, and as armature the drive's reflected inertia. Named poses are keyframes, with the
-    torques that hold them.
-    The parallelogram has a second, crossed form, which starts where it is flat: the coupled limit keeps away from it at
-    lower = inner, nothing does at lower - inner = 180 deg.
+    Each joint has a motor, whose control is the joint torque [Nm, N for the extension]. If the
+    joint has a drive, the control is limited to what the drive allows at rest with its margin, and
+    the armature is the drive's reflected inertia. Named poses are keyframes, with their static
+    torques as controls.
+
+    The parallelogram has a second, crossed configuration, which it can enter where it is flat. The
+    coupled limit prevents this at lower = inner. Nothing prevents it at lower - inner = 180 deg.
 
     Raises:
         InputError: a moving body without mass or without inertia, which MuJoCo cannot simulate.
@@ -116,8 +121,8 @@ def mjcf(boom: Boom) -> str:
             raise InputError(f"{name} has no mass, or no inertia about some axis; MuJoCo needs both to be above 0")
     top = Element("mujoco", model=boom.name)
     for text in (
-        "The parallelogram is closed at pin 7 by the connect constraint. Start from a keyframe: all joints at 0 is flat.",
-        "A motor's control is the torque at the joint. Its armature is the drive's reflected inertia, where that is known.",
+        "The connect constraint closes the parallelogram at pin 7. Start from a keyframe: with all joints at 0 it is flat.",
+        "A motor's control is the joint torque. The armature of a joint is its drive's reflected inertia, if that is known.",
         *_remarks(boom),
     ):
         top.append(ElementTree.Comment(f" {text} "))
@@ -131,10 +136,10 @@ def mjcf(boom: Boom) -> str:
         bodies[link.name] = SubElement(bodies[link.parent], "body", pose, name=link.name)
         _mjcf_body(bodies[link.name], boom, link)
     equality = SubElement(top, "equality")
-    # The stiffest constraint that MuJoCo has: it yields to a ten-thousandth of the acceleration that it stops.
+    # The stiffest constraint in MuJoCo: it lets through 1e-4 of the acceleration that it prevents.
     stiff = {"solref": "0.002 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
-    # By bodies and an anchor, because Drake ignores sites. The anchor is in body1; MuJoCo finds the place in body2 with all
-    # joints at 0, where the loop is closed.
+    # Bodies and an anchor, because Drake ignores sites. The anchor is in the frame of body1. MuJoCo
+    # finds its position in body2 with all joints at 0, where the loop is closed.
     pin = {"body1": "outer", "body2": "upper", "anchor": _text((boom.geometry.L4, 0.0, 0.0))}
     SubElement(equality, "connect", {**pin, **stiff}, name="pin_7")
     actuators = SubElement(top, "actuator")
@@ -169,21 +174,21 @@ _PARALLEL, _RAISED, _ACROSS = np.eye(3), _axes((1, 0, 0), (0, 0, 1)), _axes((0, 
 
 @dataclass(frozen=True, eq=False)
 class _Link:
-    """A link, and the joint along its z axis that hangs it on its parent."""
+    """Link, and the joint along its z axis that connects it to its parent."""
 
     name: str
     parent: str
     position: tuple[float, float, float]
-    """of the link's frame in its parent's, where the joint's coordinate is 0 [m]"""
+    """Position of the link's frame in its parent's [m], with the joint's coordinate at 0."""
     rotation: Array
-    """likewise, (3, 3)"""
+    """Rotation (3, 3) of the link's frame in its parent's, with the joint's coordinate at 0."""
     joint: str
     row: tuple[float, ...] | None
-    """The joint's coordinate is row . q; None where it is fixed."""
+    """The joint's coordinate is row . q; None for a fixed joint."""
 
 
 def _linkage(boom: Boom) -> list[_Link]:
-    """Cut open at pin 7; parents before children."""
+    """Return the links of the linkage cut open at pin 7, parents before children."""
     g = boom.geometry
     shoulder = (g.L2, 0.0, g.L1)
     return [
@@ -197,8 +202,11 @@ def _linkage(boom: Boom) -> list[_Link]:
 
 
 def _tree(boom: Boom) -> list[_Link]:
-    """Cut open at pin 8; parents before children. A parser that wants a joint before those that mimic it, and takes them depth
-    first by name, as Pinocchio's does, gets inner and lower before the rest."""
+    """Return the links of the linkage cut open at pin 8, parents before children.
+
+    Pinocchio's parser traverses depth first, by name, and needs a joint before those that mimic it.
+    It meets inner and lower before the rest.
+    """
     g = boom.geometry
     shoulder = (g.L2, 0.0, g.L1)
     return [
@@ -228,7 +236,7 @@ def _body(boom: Boom, link: str) -> Body | None:
 
 
 def _range(boom: Boom, row: tuple[float, ...]) -> tuple[float, float]:
-    """Of the coordinate row . q within the position limits, the linkage's coupled one included."""
+    """Return the range of the coordinate row . q within the position and coupled limits."""
     ends = np.array(row) * np.stack([boom.limits.lower, boom.limits.upper])
     low, high = float(ends.min(axis=0).sum()), float(ends.max(axis=0).sum())
     if row[1] * row[2] < 0.0:  # between the two link directions
@@ -248,15 +256,18 @@ def _effort(boom: Boom, joint: int) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class _Rod:
-    """A solid cylinder between two points of a link's own frame [m]."""
+    """Solid cylinder between two points of a link's frame [m]."""
 
     ends: Array
-    """(2, 3)"""
+    """(2, 3)."""
     radius: float
 
 
 def _rods(boom: Boom) -> Mapping[str, list[_Rod]]:
-    """What is drawn of each body: rods along its link axes (e, p), from pin to pin; the upper link carries the housing."""
+    """Return the rods that are drawn for each body, from pin to pin along its link axes (e, p).
+
+    The upper link carries the actuator's housing.
+    """
     g = boom.geometry
     stroke = float(boom.limits.upper[3])
     rod = max(g.L7, stroke)
@@ -343,7 +354,7 @@ def _urdf_joint(top: Element, boom: Boom, link: _Link) -> None:
 
 
 def _urdf_transmission(top: Element, joint: str) -> None:
-    """An actuator that acts on the joint itself: its effort is the joint's torque."""
+    """Add an actuator with ratio 1, whose effort is the joint torque."""
     element = SubElement(top, "transmission", name=f"{joint}_transmission")
     SubElement(element, "type").text = "transmission_interface/SimpleTransmission"
     driven = SubElement(element, "joint", name=joint)
@@ -353,7 +364,10 @@ def _urdf_transmission(top: Element, joint: str) -> None:
 
 
 def _rpy(R: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll); yaw is 0 where pitch is +-90 deg."""
+    """Return roll, pitch and yaw of R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    At a pitch of +-90 deg, yaw is 0.
+    """
     across = np.hypot(R[0, 0], R[1, 0])
     pitch = float(np.arctan2(-R[2, 0], across))
     if across < 1e-9:
@@ -387,7 +401,8 @@ def _mjcf_body(element: Element, boom: Boom, link: _Link) -> None:
     if body is not None and body.mass > 0.0:
         principal = np.diag(body.inertia)
         inertia = {"diaginertia": _text(principal)}
-        if (body.inertia != np.diag(principal)).any():  # MuJoCo diagonalises a full tensor, which it wants positive
+        if (body.inertia != np.diag(principal)).any():
+            # MuJoCo diagonalises a full tensor, which must be positive definite.
             inertia = {"fullinertia": _text(body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])}
         SubElement(element, "inertial", inertia, pos=_text(body.com), mass=_text(body.mass))
     drawn = {"rgba": _text((*_COLORS[link.name], 1.0)), "contype": "0", "conaffinity": "0", "group": "2", "mass": "0"}

@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from boom_model.arrays import Array
-from boom_model.link_design import Limits, least_mass, thesis_design
+from boom_model.link_design import Limits, least_mass
 from boom_model.link_design.finite_elements import Solution, Theory, solve_beam, solve_plate
 from planner.links.design import LinkDesign, by_thesis, with_shear
 
@@ -36,8 +37,9 @@ class Convergence:
     """(m, 1 + places) elements and von Mises stress [Pa] at PLACES, of beam elements of one height each (figure 3-18)"""
 
 
+@lru_cache(maxsize=1)  # picture, report and JSON of one design share it
 def study(design: LinkDesign) -> Convergence:
-    """The convergence studies of a design; slices up to its own number."""
+    """Run the convergence studies of a design, with slices up to its own number."""
     slices = [n for n in SLICES if n < design.beam.slices] + [design.beam.slices]
     case = design.cases.at([design.worst])
     solved: dict[str, list[Solution]] = {}
@@ -66,18 +68,8 @@ def _by_steps(design: LinkDesign) -> Array | None:
     load = design.thesis_load
     if load is None:
         return None
-    limits = Limits(stress=design.limits.stress, deflection=design.limits.deflection)
-    return np.array(
-        [
-            (
-                step,
-                thesis_design(
-                    design.beam, load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=step
-                ).mass,
-            )
-            for step in STEPS
-        ]
-    )
+    plain = Limits(stress=design.limits.stress, deflection=design.limits.deflection)
+    return np.array([(step, by_thesis(design.beam, load, plain, replace(design.task, step=step)).mass) for step in STEPS])
 
 
 def _solved(design: LinkDesign, name: str, elements: int) -> Solution:

@@ -26,14 +26,14 @@ from boom_model.link_design import (
     least_mass,
     link_body,
     load_link,
-    mass,
     thesis_design,
     von_mises,
     with_body,
 )
 from boom_model.link_design.beam import Forces
-from boom_model.link_design.exact import buckling_load, pressed
+from boom_model.link_design.exact import buckling_load
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
+from boom_model.link_design.search import pressed
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
 from boom_model.plausible import DEFLECTION, HEIGHT, HEIGHT_STEP, SAFETY_FACTOR, TAPER, THICKNESS
 from planner.checks.kinds import CheckKind, Part
@@ -184,24 +184,12 @@ class LinkDesign:
     """Masses of the plates by the thesis's method and the exact one under the same constraints, the thesis's [kg]"""
     instants: Array | None
     """(k, 2) motion and time [s] of each case; None for a load that is no instant"""
-    heights: Array
-    """(n + 1,) [m]"""
-    stress_heights: Array
-    mass: float
-    """Of the plates from pin to pin [kg]"""
-    stress_mass: float
-    deflection: float
-    """[m], by the method's own formula and forces"""
-    stress_deflection: float
-    max_stress: float
-    buckling_load: float
-    """[N]: by the thesis's formula for its method, by the tapered column's eigenvalue for the exact one"""
+    found: Design | ThesisDesign
+    """Heights, masses and deflections of the plates from pin to pin, by the task's method"""
     tapered_load: float
-    """[N], the eigenvalue"""
+    """Critical end load [N] by the eigenvalue of the tapered column"""
     pressed: float
     """Largest end load along the link [N]"""
-    exact: Design | None
-    thesis: ThesisDesign | None
     own_deflection: float
     """[m] with the final beam's own mass and shear, whatever the method left out"""
     stress: Array
@@ -220,6 +208,34 @@ class LinkDesign:
     """Of the link's joint along all motions, with the old link and the new (samples,) [Nm]"""
     motors: tuple[MotorChoice, ...]
     notes: tuple[str, ...]
+
+    @property
+    def exact(self) -> Design | None:
+        return self.found if isinstance(self.found, Design) else None
+
+    @property
+    def thesis(self) -> ThesisDesign | None:
+        return self.found if isinstance(self.found, ThesisDesign) else None
+
+    @property
+    def heights(self) -> Array:
+        """(n + 1,) [m]"""
+        return self.found.heights
+
+    @property
+    def mass(self) -> float:
+        """Mass of the plates from pin to pin [kg]."""
+        return self.found.mass
+
+    @property
+    def max_stress(self) -> float:
+        """Largest von Mises stress [Pa]."""
+        return float(self.stress.max())
+
+    @property
+    def buckling_load(self) -> float:
+        """Critical end load [N]: the thesis's formula for its method, else the tapered column's."""
+        return self.tapered_load if self.thesis is None else thesis_buckling(self.link, self.beam, self.heights)
 
     @property
     def joint(self) -> int:
@@ -280,13 +296,12 @@ def design_link(
         cases, instants = link_cases(boom, link, trajectories, payload_as=task.payload_as)
         if task.largest_components:
             cases, instants = largest_components(cases), None
-    exact, old = None, None
+    found: Design | ThesisDesign
     if method is Method.THESIS and old_load is not None:
-        old = by_thesis(beam, old_load, limits, task)
-        heights, stress_heights = old.heights, old.stress_heights
+        found = by_thesis(beam, old_load, limits, task)
     else:
-        exact = least_mass(beam, cases, limits, own_mass=task.own_mass, shear=with_shear(task))
-        heights, stress_heights = exact.heights, exact.stress_heights
+        found = least_mass(beam, cases, limits, own_mass=task.own_mass, shear=with_shear(task))
+    heights = found.heights
     forces = internal_forces(beam, heights, cases)
     bent = deflection(beam, heights, forces, shear=True)
     stresses = von_mises(beam, heights, forces)
@@ -302,20 +317,11 @@ def design_link(
         limits=limits,
         cases=cases,
         thesis_load=old_load,
-        equal_constraints=_equals(beam, cases, limits, task, old_load, old),
+        equal_constraints=_equals(beam, cases, limits, task, old_load, found),
         instants=instants,
-        heights=heights,
-        stress_heights=stress_heights,
-        mass=old.mass if old is not None else mass(beam, heights),
-        stress_mass=old.stress_mass if old is not None else mass(beam, stress_heights),
-        deflection=_first(old, exact).deflection,
-        stress_deflection=_first(old, exact).stress_deflection,
-        max_stress=float(stress.max()),
-        buckling_load=tapered if old is None else thesis_buckling(link, beam, heights),
+        found=found,
         tapered_load=tapered,
         pressed=pressed(cases),
-        exact=exact,
-        thesis=old,
         own_deflection=float(bent[worst]),
         stress=read_only(stress),
         worst=worst,
@@ -327,7 +333,7 @@ def design_link(
         trajectories=tuple(trajectories),
         torques=(torques[0], torques[1]),
         motors=tuple(_motors(boom, after, DRIVEN_BY[link.name], trajectories, task.payload_as, catalogue)),
-        notes=tuple(_notes(boom, task, link, beam, cases, trajectories, tapered, float(bent[worst]), heights, old, exact)),
+        notes=tuple(_notes(boom, task, link, beam, cases, trajectories, tapered, float(bent[worst]), found)),
     )
 
 
@@ -374,7 +380,12 @@ def with_shear(task: LinkTask) -> bool:
 
 
 def _equals(
-    beam: Beam, cases: LoadCases, limits: Limits, task: LinkTask, old_load: ThesisLoad | None, old: ThesisDesign | None
+    beam: Beam,
+    cases: LoadCases,
+    limits: Limits,
+    task: LinkTask,
+    old_load: ThesisLoad | None,
+    found: Design | ThesisDesign,
 ) -> tuple[float, float] | None:
     """Masses [kg] of the thesis's method and of the exact one under the thesis's own constraints; None without such a load.
 
@@ -383,17 +394,8 @@ def _equals(
     if old_load is None:
         return None
     plain = Limits(stress=limits.stress, deflection=limits.deflection)
-    theirs = old or thesis_design(
-        beam, old_load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=task.step
-    )
+    theirs = found if isinstance(found, ThesisDesign) else by_thesis(beam, old_load, plain, task)
     return theirs.mass, least_mass(beam, cases, plain, own_mass=False).mass
-
-
-def _first(old: ThesisDesign | None, exact: Design | None) -> ThesisDesign | Design:
-    found = exact if old is None else old
-    if found is None:
-        raise RuntimeError("one of the methods ran")
-    return found
 
 
 def _one_of(name: str, value: str, known: type[E]) -> E:
@@ -485,9 +487,7 @@ def _notes(
     trajectories: Sequence[Trajectory],
     tapered: float,
     bent: float,
-    heights: Array,
-    old: ThesisDesign | None,
-    exact: Design | None,
+    found: Design | ThesisDesign,
 ) -> list[str]:
     notes = []
     if task.load == LoadFrom.THESIS:
@@ -517,12 +517,12 @@ def _notes(
             "the plates' own mass loads the design, that of fittings and cross plates does not: 0.5 kg near the end of the "
             "thesis's inner link adds 2 % to its deflection"
         )
-    if heights.max() > beam.length / 5.0:
+    if found.heights.max() > beam.length / 5.0:
         notes.append(
-            f"the plates are up to {heights.max():.3g} m high, more than a fifth of their {beam.length:g} m: "
+            f"the plates are up to {found.heights.max():.3g} m high, more than a fifth of their {beam.length:g} m: "
             "beam theory does not hold"
         )
-    if exact is not None and exact.gap is None:
+    if isinstance(found, Design) and found.gap is None:
         notes.append("no lower bound within a tenth of the mass is proven: a lighter link may keep these limits")
     notes.append("lateral bending and torsion, fatigue, welds, pin holes and local buckling of a plate's edge are not checked")
     if bent > task.deflection * (1.0 + 1e-4):
@@ -536,6 +536,6 @@ def _notes(
             f"buckling: the tapered column holds {tapered:.0f} N, below {task.safety_factor:g} times the end load of "
             f"{pressed(cases):.0f} N"
         )
-    if old is not None:
+    if isinstance(found, ThesisDesign):
         notes.append("the thesis's method freezes the moments of its first stage and leaves out shear")
     return notes

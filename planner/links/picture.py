@@ -57,11 +57,12 @@ def _draw_design(design: LinkDesign, panels: "Sequence[Axes]") -> None:
     """Contour, stress, torque and mass."""
     contour, stress, torque, bars = panels
     x = design.beam.stations
-    for H, name, color in ((design.heights, "design", _BLUE), (design.stress_heights, "stress only", _ORANGE)):
+    for H, name, color in ((design.heights, "design", _BLUE), (design.found.stress_heights, "stress only", _ORANGE)):
         contour.fill_between(x, 500.0 * H, -500.0 * H, color=color, alpha=0.35 if name == "design" else 0.6, label=name)
     contour.plot([0.0, design.link.length], [0.0, 0.0], "ko", markersize=4, label="pins")
     contour.set(title="Contour of the plates (height not to scale)", xlabel="x from the root [m]", ylabel="y [mm]")
-    only = von_mises(design.beam, design.stress_heights, internal_forces(design.beam, design.stress_heights, design.cases))
+    before = design.found.stress_heights
+    only = von_mises(design.beam, before, internal_forces(design.beam, before, design.cases))
     stress.plot(x, 1e-6 * design.stress, color=_BLUE, label="design")
     stress.plot(x, 1e-6 * only.max(axis=0), color=_ORANGE, linewidth=1.0, label="stress only")
     stress.axhline(1e-6 * design.limits.stress, color="black", linestyle="--", linewidth=1.0, label="limit")

@@ -1,0 +1,1 @@
+"""Missions: duty cycles of moves, holds and pauses."""

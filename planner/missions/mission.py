@@ -1,7 +1,8 @@
-"""A duty cycle of several moves, holds and pauses, from a TOML file to the samples and times that the checks look at.
+"""Duty cycle of moves, holds and pauses: from a TOML file to the samples that are checked.
 
-A **hold** stands with the motors on; in a **pause** the brakes hold, and a motor is off where its joint has one. Moves come
-back in a cycle, so each different one is planned and sampled once and carries how often it is made.
+In a **hold** the arm is at rest with the motors on. In a **pause** the brakes hold, and the motors
+of the joints that have a brake are off. A move may occur many times in a cycle. It is planned and
+sampled once, with the number of its occurrences.
 """
 
 from collections.abc import Iterator
@@ -39,7 +40,7 @@ _SAME_POSITION = 1e-6
 _DECIMALS = 9
 _DOWN, _HORIZONTAL = "down", "horizontal"
 _SHARED = ("profile", "pass_via", "jerk_bound", "average_torque", "along", "pitch", "constraint")
-"""Keys of a step that are fields of MoveWords as they are."""
+"""Keys of a step that have the name and meaning of fields of MoveWords."""
 _Duration = Annotated[float, DURATION]
 
 
@@ -64,7 +65,9 @@ class _Step(Table):
     def _one_of(self) -> "_Step":
         given = [name for name in ("to", "hold_s", "pause_s", "repeat") if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(f"a step has one of to, hold_s, pause_s and repeat; this one has {', '.join(given) or 'none'}")
+            raise ValueError(
+                f"a step must have one of to, hold_s, pause_s and repeat; this one has {', '.join(given) or 'none'}"
+            )
         allowed = {
             "to": set(_Step.model_fields) - {"hold_s", "pause_s", "repeat", "steps"},
             "repeat": {"repeat", "steps"},
@@ -91,7 +94,7 @@ class _MissionTable(Table):
 
 @dataclass(frozen=True)
 class Mission:
-    """A duty cycle as its file gives it."""
+    """Duty cycle as its file gives it."""
 
     name: str
     origin: Origin
@@ -99,37 +102,38 @@ class Mission:
 
     @property
     def required_life(self) -> Sourced[float] | None:
-        """What the gearboxes are to live, pauses included [s]."""
+        """Required life of the gearboxes, pauses included [s]."""
         hours = self.table.required_life_h
         return None if hours is None else Sourced(hours * 3600.0, self.origin)
 
     @property
     def tip_tolerance(self) -> Sourced[float] | None:
-        """[m]"""
+        """Tolerance of the tip's position [m]."""
         tolerance = self.table.tip_tolerance_mm
         return None if tolerance is None else Sourced(tolerance * 1e-3, self.origin)
 
     @property
     def jerk_limited(self) -> bool:
-        """Whether a step is planned within the jerk limits."""
+        """Whether any step is planned within the jerk limits."""
         return _jerk_limited(self.table.steps)
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """The mission itself, where it is assumed."""
+        """Assumptions for the report: the mission itself, if it is assumed."""
         return (f"the mission: {self.origin.source}",) if self.origin.basis is Basis.ASSUMED else ()
 
 
 def named_missions() -> tuple[str, ...]:
-    """Names of the missions that come with the toolkit."""
+    """Return the names of the missions that come with the toolkit."""
     return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
 
 
 def load_mission(name: str) -> Mission:
-    """A named mission, or one from a TOML file of the same form (a name that ends in .toml).
+    """Load a named mission, or one from a TOML file of the same form (a name that ends in .toml).
 
     Raises:
-        InputError: no such mission, or the file cannot be read or is malformed; the key is named.
+        InputError: the mission is unknown, or the file cannot be read or is malformed; the message
+            names the key.
     """
     table = read_toml(named_file(_FOLDER, name, "mission"), _MissionTable)
     return Mission(table.name, Origin(Basis(table.basis), table.source), table)
@@ -137,7 +141,7 @@ def load_mission(name: str) -> Mission:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """A move, a hold or a pause, from its own time 0."""
+    """Move, hold or pause, with time starting at 0."""
 
     label: str
     trajectory: Trajectory
@@ -145,7 +149,7 @@ class Leg:
     powered: bool
 
     def stretched(self, factor: float) -> "Leg":
-        """The same leg, its motion slower by `factor`; a hold or a pause as it is."""
+        """Return the leg with its motion slower by `factor`; a hold or a pause is unchanged."""
         if not self.moves or factor == 1.0:
             return self
         old = self.trajectory
@@ -162,22 +166,25 @@ class Leg:
 
 @dataclass(frozen=True, eq=False)
 class Cycle:
-    """A mission's different legs, and the order in which it goes through them."""
+    """Distinct legs of a mission, and their order."""
 
     mission: Mission
     legs: tuple[Leg, ...]
     order: tuple[int, ...]
-    """Index of each leg travelled, from first to last."""
+    """Index of the leg at each place of the cycle, from first to last."""
     notes: tuple[str, ...]
 
     @cached_property
     def counts(self) -> Array:
-        """How often each leg is travelled."""
+        """Number of occurrences of each leg."""
         return np.bincount(self.order, minlength=len(self.legs)).astype(float)
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """Every different leg once, at the time of its first: times that do not fall, but may leap or stand."""
+        """Samples of every distinct leg, at the time of its first occurrence.
+
+        The times never decrease, but they may jump or repeat from leg to leg.
+        """
         durations = np.array([self.legs[i].trajectory.duration for i in self.order])
         begins = np.concatenate([[0.0], np.cumsum(durations)])
         first = [begins[self.order.index(i)] for i in range(len(self.legs))]
@@ -195,7 +202,7 @@ class Cycle:
 
     @cached_property
     def duty(self) -> Duty:
-        """How long the samples of `trajectory` last in all."""
+        """Total duration of each sample of `trajectory` over the cycle."""
         weights = [trapezoid_weights(leg.trajectory.t) * n for leg, n in zip(self.legs, self.counts, strict=True)]
         powered = [np.full(len(leg.trajectory.t), leg.powered) for leg in self.legs]
         return Duty(
@@ -206,16 +213,16 @@ class Cycle:
         )
 
     def stretched(self, factor: float) -> "Cycle":
-        """The same cycle with every move slower by `factor`; holds and pauses last as they did."""
+        """Return the cycle with every move slower by `factor`; holds and pauses are unchanged."""
         return Cycle(self.mission, tuple(leg.stretched(factor) for leg in self.legs), self.order, self.notes)
 
     @property
     def moves(self) -> list[slice]:
-        """The samples of each move in `trajectory`."""
+        """Samples of each move in `trajectory`."""
         return [samples for leg, samples in self.slices() if leg.moves]
 
     def slices(self) -> Iterator[tuple[Leg, slice]]:
-        """Each leg and its samples in `trajectory`."""
+        """Yield each leg and its samples in `trajectory`."""
         begin = 0
         for leg in self.legs:
             end = begin + len(leg.trajectory.t)
@@ -224,15 +231,18 @@ class Cycle:
 
 
 def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase = LEVEL, step: float = STEP, track: Track = iter) -> Cycle:
-    """A mission's legs, planned one after the other, sampled as finely as the checks of a lone move.
+    """Plan the legs of a mission in order, sampled as finely as the checks of a single move.
 
     Args:
-        vehicle: a slope to stand on; what changes with time has no place in a cycle.
-        track: iterates over the steps, and may show how far it is.
+        boom: the boom.
+        mission: the duty cycle.
+        vehicle: vehicle case; it may be a slope only.
+        step: longest sampling step [s] of a planned move.
+        track: iterates over the steps, and may show the progress.
 
     Raises:
-        InputError: a step is malformed, or the vehicle does more than stand on a slope; the step is named.
-        InfeasibleError: a step cannot be done; the step is named.
+        InputError: a step is malformed (the message names it), or the vehicle moves.
+        InfeasibleError: a step cannot be planned; the message names it.
     """
     check_steady(vehicle)
     table = mission.table
@@ -242,7 +252,7 @@ def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase = LEVEL, step:
     if len(steps) > _MOST_STEPS:
         raise InputError(f"mission {mission.name}: more than {_MOST_STEPS:,} steps")
     for where, part in track(steps):
-        key = (id(part), tuple(np.round(q, _DECIMALS) + 0.0))  # a cycle comes back to a position to rounding
+        key = (id(part), tuple(np.round(q, _DECIMALS) + 0.0))  # positions return up to rounding
         if key not in known:
             try:
                 leg, after, said = _leg(boom, part, q, vehicle, step)
@@ -257,27 +267,27 @@ def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase = LEVEL, step:
         if index is not None:
             order.append(index)
     if not legs:
-        raise InputError(f"mission {mission.name}: nothing moves, and nothing lasts")
+        raise InputError(f"mission {mission.name}: it has no move, no hold and no pause")
     if np.abs(q - start).max() > _SAME_POSITION:
-        notes.append("the cycle ends elsewhere than it starts: the way back is not counted")
+        notes.append("the cycle does not end where it starts; the way back is not counted")
     return Cycle(mission, tuple(legs), tuple(order), tuple(dict.fromkeys(notes)))
 
 
 def check_steady(vehicle: VehicleCase) -> None:
-    """A cycle stands on a slope at most.
+    """Check that a vehicle case is level ground or a slope only.
 
     Raises:
         InputError: the vehicle moves.
     """
     if not vehicle.is_steady:
-        raise InputError(f"vehicle case {vehicle.name}: a mission takes a slope alone; check its moves with tracks and shocks")
+        raise InputError(f"vehicle case {vehicle.name}: a mission can be on a slope only; check track and shock move by move")
 
 
 def check_cycle(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", vehicle: VehicleCase = LEVEL) -> Report:
-    """The checks of a whole cycle: peaks over its legs, means over its time.
+    """Check a whole cycle: peaks over its legs, means over its time.
 
     Raises:
-        InputError: the vehicle does more than stand on a slope.
+        InputError: the vehicle moves.
     """
     check_steady(vehicle)
     report = check(
@@ -288,13 +298,13 @@ def check_cycle(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", veh
 
 
 def leg_sentences(cycle: Cycle) -> tuple[str, ...]:
-    """How often each leg is travelled, and how long it takes."""
+    """Describe the number of occurrences and the duration of each leg."""
     pairs = zip(cycle.legs, cycle.counts, strict=True)
     return tuple(f"{count:.0f} x {leg.label}, {leg.trajectory.duration:.3f} s" for leg, count in pairs)
 
 
 def _expanded(steps: list[_Step], where: str) -> Iterator[tuple[str, _Step]]:
-    """Every step travelled, repeats written out, and where it stands in the file."""
+    """Yield every step, with repeats written out, and its place in the file."""
     for number, part in enumerate(steps, start=1):
         name = f"{where} {number}"
         for _ in range(part.repeat or 0):
@@ -308,7 +318,7 @@ def _jerk_limited(steps: list[_Step]) -> bool:
 
 
 def _leg(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -> tuple[Leg | None, Array, tuple[str, ...]]:
-    """A step as a leg, None where it moves nothing; where it ends, and what is to be said of it."""
+    """Return a step's leg (None if nothing moves), the joint position at its end, and its notes."""
     if part.to is not None:
         return _move(boom, part, q, vehicle, step)
     seconds, powered = (part.hold_s, True) if part.hold_s is not None else (part.pause_s, False)
@@ -337,8 +347,8 @@ def _move(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) 
     apart = float(np.abs(fine.q[0] - q).max())
     if apart > _SAME_POSITION:
         raise InfeasibleError(
-            f"the line starts at another joint position than where the step before ends ({apart:.3g} rad or m off): "
-            "give both the same pitch and constraint"
+            f"the line does not start at the joint position where the previous step ends ({apart:.3g} rad or m off); "
+            "give both steps the same pitch and constraint"
         )
     way = part.to if by_joints else f"{part.to} along {part.along}"
     label = " ".join([f"to {way}", *(f"via {text}" for text in part.via)])

@@ -1,0 +1,1 @@
+"""Motions: sampled trajectories, their files, and the motion of the vehicle."""

@@ -1,4 +1,7 @@
-"""A sampled motion as a file: CSV, Parquet, and ROS's trajectory_msgs/JointTrajectory as YAML or JSON."""
+"""Files of a sampled motion: CSV, Parquet, and ROS's trajectory_msgs/JointTrajectory.
+
+A JointTrajectory is written as YAML or JSON.
+"""
 
 import json
 from collections.abc import Iterator
@@ -26,7 +29,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 FORMS = (".csv", ".parquet", ".yaml", ".yml", ".json")
-"""Endings of the files that a motion can be written to; the first two can be read back."""
+"""Endings of the files that a motion can be written to. The first two can be read back."""
 
 _PER = {"q": "", "qd": "/s", "qdd": "/s^2"}
 UNITS = {"t": "s"} | {
@@ -34,26 +37,27 @@ UNITS = {"t": "s"} | {
 } | dict(zip(TORQUES, LOAD_UNITS, strict=True))  # fmt: skip
 """Unit of each column of a motion."""
 
-_ROWS = 20_000  # turned into text at once
+_ROWS = 20_000  # converted to text at once
 
 
 def form_of(path: str | Path) -> str:
-    """The ending that says what a motion's file is.
+    """Return the ending of a motion's file, which gives its form.
 
     Raises:
-        InputError: it is none of FORMS.
+        InputError: the ending is none of FORMS.
     """
     form = Path(path).suffix.lower()
     if form not in FORMS:
-        raise InputError(f"{path}: a motion is written as {', '.join(FORMS)}")
+        raise InputError(f"{path}: the name of a motion's file must end in one of {', '.join(FORMS)}")
     return form
 
 
 def write_motion(trajectory: Trajectory, path: str | Path, tau: Array | None = None) -> None:
-    """The motion in the form that the file's name ends with, with its torques (n, 5) where given.
+    """Write a motion in the form of the file's ending, with its torques (n, 5) if given.
 
     Raises:
-        InputError: the ending is none of FORMS, the file cannot be written, or as `write_joint_trajectory`.
+        InputError: the ending is none of FORMS, the file cannot be written, or as
+            `write_joint_trajectory`.
     """
     form = form_of(path)
     if form == ".csv":
@@ -65,20 +69,25 @@ def write_motion(trajectory: Trajectory, path: str | Path, tau: Array | None = N
 
 
 def read_motion(path: str | Path) -> Trajectory:
-    """A motion from Parquet (.parquet) or CSV (any other name); see `read_csv`, whose rules hold for both.
+    """Read a motion from Parquet (.parquet) or CSV (any other ending).
+
+    The rules of `read_csv` hold for both.
 
     Raises:
-        InputError: as `read_csv`; or a Parquet column has another unit than this toolkit's.
+        InputError: as `read_csv`, or a Parquet column has a unit other than this toolkit's.
     """
     data, notes = read_quantities(path, with_torques=False)
     return trajectory_of(path, data, notes)
 
 
 def read_quantities(path: str | Path, *, with_torques: bool = True) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """What stands in a motion's file: t (n,) and q, and qd, qdd and tau where they are there, (n, 5) each; and its notes.
+    """Read the quantities in a motion's file, and its notes.
+
+    The quantities are t (n,) and q (n, 5), and those of qd, qdd and tau (n, 5) that the file has.
 
     Args:
-        with_torques: whether to look at tau at all.
+        path: the file.
+        with_torques: whether to read tau.
 
     Raises:
         InputError: as `read_motion`.
@@ -93,7 +102,7 @@ def read_quantities(path: str | Path, *, with_torques: bool = True) -> tuple[dic
 
 
 def _write_parquet(trajectory: Trajectory, path: str | Path, tau: Array | None) -> None:
-    """Each column carries its unit in its metadata, the file the motion's notes."""
+    """Write Parquet, with units in the columns' metadata and notes in the file's metadata."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -123,7 +132,7 @@ def _parquet_table(path: str | Path) -> "tuple[pa.Table, tuple[str, ...]]":
     try:
         table = table.cast(pa.schema(fields, metadata=table.schema.metadata))
     except pa.ArrowException as error:
-        raise InputError(f"{path}: a column is not of numbers: {error}") from None
+        raise InputError(f"{path}: a column does not hold numbers: {error}") from None
     try:
         notes = json.loads((table.schema.metadata or {}).get(b"notes", b"[]"))
     except (ValueError, RecursionError):
@@ -135,20 +144,21 @@ def _parquet_table(path: str | Path) -> "tuple[pa.Table, tuple[str, ...]]":
 
 
 def write_joint_trajectory(trajectory: Trajectory, path: str | Path, tau: Array | None = None) -> None:
-    """The motion as ROS's trajectory_msgs/JointTrajectory: YAML, or JSON where the file's name ends with .json.
+    """Write a motion as ROS's trajectory_msgs/JointTrajectory, as JSON (.json) or YAML.
 
-    Joint names are those of `JOINTS`, which the URDF has too; the extension is in m and N. A point's time_from_start counts
-    from the first sample, to the nanosecond. The header's stamp is 0, which starts a motion when it arrives, and its frame is
-    "mount", the URDF's root.
+    The joint names are `JOINTS`, as in the URDF. The extension is in m and N. A point's
+    time_from_start is measured from the first sample, in whole nanoseconds. The header's stamp is
+    0, so the motion starts when the message arrives. Its frame is "mount", the URDF's root.
 
-    A point a line, as both forms take it: a YAML library needs some 0.5 ms for a point.
+    The text is made here, one line per point, because a YAML library needs some 0.5 ms per point.
 
     Raises:
-        InputError: two samples fall on the same nanosecond, the motion lasts 2^31 s or longer, or the file cannot be written.
+        InputError: two samples fall on the same nanosecond, the motion lasts 2^31 s or longer, or
+            the file cannot be written.
     """
     since = trajectory.t - trajectory.t[0]
     if since[-1] >= 2.0**31:
-        raise InputError(f"the motion lasts {since[-1]:g} s; a JointTrajectory holds less than 2^31 s")
+        raise InputError(f"the motion lasts {since[-1]:g} s; a JointTrajectory must last less than 2^31 s")
     nanoseconds = np.rint(since * 1e9).astype(np.int64)
     if (np.diff(nanoseconds) <= 0).any():
         at = int(np.argmax(np.diff(nanoseconds) <= 0)) + 1
@@ -169,7 +179,7 @@ def write_joint_trajectory(trajectory: Trajectory, path: str | Path, tau: Array 
 
 
 def _points(trajectory: Trajectory, nanoseconds: "np.typing.NDArray[np.int64]", tau: Array | None) -> Iterator[list[str]]:
-    """The points as JSON objects, a batch at a time."""
+    """Yield the points as JSON objects, in batches."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -191,7 +201,10 @@ def _points(trajectory: Trajectory, nanoseconds: "np.typing.NDArray[np.int64]", 
 
 
 def _numbers(values: Array) -> "pa.Array":
-    """Floats as text, all digits, each with a point: YAML 1.1 reads 1e-9 as text, and ROS takes no 0 for a float."""
+    """Return floats as text with all digits and a decimal point.
+
+    Without the point, YAML 1.1 reads 1e-9 as text, and ROS does not accept 0 as a float.
+    """
     import pyarrow as pa
     import pyarrow.compute as pc
 

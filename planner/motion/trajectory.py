@@ -1,4 +1,4 @@
-"""A sampled motion, and its CSV form."""
+"""A sampled motion, and its CSV file."""
 
 import os
 from collections import Counter
@@ -22,22 +22,22 @@ if TYPE_CHECKING:
     from planner.motion.planned import PlannedMotion
 
 STEP = 0.01
-"""Default sampling step [s], the thesis's (section 3.5)."""
+"""Default sampling step [s] (thesis, section 3.5)."""
 
-_ROUNDING = 1e-9  # relative; a whole number of steps is not one more for rounding
+_ROUNDING = 1e-9  # relative; rounding must not add a step to a whole number of steps
 MOST_SAMPLES = 10_000_000
-"""Samples that a motion may have: a day at a controller's 100 Hz."""
+"""Largest number of samples of a motion: a day at a controller's 100 Hz."""
 
 _QUANTITIES = ("q", "qd", "qdd")
 COLUMNS = ("t", *(f"{name}{i}" for name in _QUANTITIES for i in range(1, 6)))
-"""Header of a motion's CSV, in SI."""
+"""Header of a motion's CSV file, in SI units."""
 
 TORQUES = tuple(f"tau{i}" for i in range(1, 6))
-"""Columns that follow where torques are written, in Nm and N."""
+"""Further columns for torques [Nm, N for the extension]."""
 
 _CLOSEST = 1e-9  # [s]
-_SHOWN = 20  # columns that a message names
-_FITTED = "velocities and accelerations are not in the file: taken from a cubic spline through its positions"
+_SHOWN = 20  # largest number of columns that a message names
+_FITTED = "velocities and accelerations are not in the file; they come from a cubic spline through its positions"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +49,12 @@ class Trajectory:
     qd: Array
     qdd: Array
     qddd: Array | None = None
-    """Jerk, of a motion that was planned with a limit on it."""
+    """Jerk; None unless the motion was planned with a jerk limit."""
     notes: tuple[str, ...] = ()
-    """What a reader of a report must know about where the samples come from."""
+    """Notes on the origin of the samples, for the report."""
     planned: "PlannedMotion | None" = None
-    """The continuous motion that these samples were taken from: checks look at it between them. None where only the samples
-    are known."""
+    """Continuous motion behind the samples, which checks examine between them. None if only the
+    samples are known."""
 
     @staticmethod
     def from_samples(
@@ -65,10 +65,11 @@ class Trajectory:
         qddd: ArrayLike | None = None,
         notes: tuple[str, ...] = (),
     ) -> "Trajectory":
-        """A trajectory from arrays, checked.
+        """Return a trajectory from arrays, after checking them.
 
         Raises:
-            InputError: not finite, shapes that do not match, no sample, or times that do not increase.
+            InputError: an array is not finite, the shapes do not match, there is no sample, or the
+                times do not increase.
         """
         t = checked("t", t)
         if t.ndim != 1 or t.size == 0:
@@ -85,24 +86,26 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
+        """Duration [s]."""
         return float(self.t[-1] - self.t[0])
 
 
 def check_size(duration: float, step: float) -> None:
-    """Whether a motion of that duration can be sampled.
+    """Check that a motion of a given duration can be sampled.
 
     Raises:
-        InputError: it makes more than MOST_SAMPLES.
+        InputError: it needs more than MOST_SAMPLES samples.
     """
     if duration > MOST_SAMPLES * step:
-        raise InputError(f"{duration:g} s at steps of {step:g} s make more than {MOST_SAMPLES:,} samples")
+        raise InputError(f"{duration:g} s at steps of {step:g} s needs more than {MOST_SAMPLES:,} samples")
 
 
 def sample(motion: Motion, step: float = STEP) -> Trajectory:
-    """The motion at equal steps of at most `step` seconds, its two ends included.
+    """Sample a motion at equal steps of at most `step` seconds, both ends included.
 
     Raises:
-        InputError: step is not a positive number.
+        InputError: step is not a positive number, or the motion needs more than MOST_SAMPLES
+            samples.
     """
     if not float(checked("step", step)) > 0.0:
         raise InputError(f"step is {step} s; it must be above 0 s")
@@ -113,8 +116,11 @@ def sample(motion: Motion, step: float = STEP) -> Trajectory:
     return Trajectory.from_samples(t, q, qd, qdd, qddd if motion.law.jerk_limited else None)
 
 
-def joined(parts: Sequence[Trajectory], notes: tuple[str, ...] = ()) -> Trajectory:
-    """Trajectories one after the other, each from the rest in which the one before ends; that sample stands once."""
+def concatenate(parts: Sequence[Trajectory], notes: tuple[str, ...] = ()) -> Trajectory:
+    """Concatenate trajectories, each of which starts at rest where the previous one ends.
+
+    The sample that two neighbours share is kept once.
+    """
     starts = np.concatenate([[0.0], np.cumsum([part.t[-1] for part in parts])])
     kept = [slice(None), *[slice(1, None)] * (len(parts) - 1)]
     t = np.concatenate([part.t[k] + start for part, k, start in zip(parts, kept, starts[:-1], strict=True)])
@@ -126,27 +132,27 @@ def joined(parts: Sequence[Trajectory], notes: tuple[str, ...] = ()) -> Trajecto
 
 
 def at_rest(q: Array, notes: tuple[str, ...] = ()) -> Trajectory:
-    """The empty move: one sample, standing still at q (5,)."""
+    """Return the trajectory of an empty move: one sample at rest at q (5,)."""
     zero = np.zeros((1, 5))
     return Trajectory.from_samples([0.0], q[None], zero, zero, notes=notes)
 
 
 def write_csv(trajectory: Trajectory, path: str | Path, tau: Array | None = None) -> None:
-    """The motion as CSV, all digits, with tau1..tau5 appended where given.
+    """Write a motion as CSV with all digits, with tau1..tau5 appended if given.
 
     Raises:
-        InputError: the file cannot be written; an old one is left as it was.
+        InputError: the file cannot be written; an existing file is left as it was.
     """
     from pyarrow import csv
 
     table = motion_table(trajectory, tau)
     with replacing(path) as temporary, open(temporary, "wb") as file:
-        file.write(f"{','.join(table.column_names)}\n".encode())  # pyarrow would put each name in quotes
+        file.write(f"{','.join(table.column_names)}\n".encode())  # pyarrow would quote the names
         csv.write_csv(table, file, csv.WriteOptions(include_header=False))
 
 
 def motion_table(trajectory: Trajectory, tau: Array | None = None) -> "pa.Table":
-    """The motion's columns under COLUMNS, and TORQUES where given."""
+    """Return a table with the columns COLUMNS, and TORQUES if given."""
     import pyarrow as pa
 
     columns = [trajectory.t, *trajectory.q.T, *trajectory.qd.T, *trajectory.qdd.T]
@@ -158,22 +164,24 @@ def motion_table(trajectory: Trajectory, tau: Array | None = None) -> "pa.Table"
 
 
 def read_csv(path: str | Path) -> Trajectory:
-    """A motion from CSV: t, q1..q5, and qd1..qd5, qdd1..qdd5 or neither (then a cubic spline through q gives them).
+    """Read a motion from CSV.
 
-    Derivatives that are given are used as given. tau1..tau5 are passed over.
+    The columns are t, q1..q5, and either all of qd1..qd5 and qdd1..qdd5 or none of them. Without
+    them, a cubic spline through q gives the derivatives; with them, they are used as they are.
+    Columns tau1..tau5 are ignored.
 
     Raises:
-        InputError: the file cannot be read, is not CSV, lacks a column or has one that is not known, or holds no samples,
-            values that are not finite numbers, or times that do not increase.
+        InputError: the file cannot be read, is not CSV, lacks a column, has an unknown one or no
+            samples, or it has values that are not finite or times that do not increase.
     """
     return trajectory_of(path, quantities(path, csv_table(path)))
 
 
 def csv_table(path: str | Path) -> "pa.Table":
-    """The table in a motion's CSV, its known columns float64.
+    """Read the table in a motion's CSV file, with its known columns as float64.
 
     Raises:
-        InputError: the file cannot be read, or is not CSV.
+        InputError: the file cannot be read or is not CSV.
     """
     import pyarrow as pa
     from pyarrow import csv
@@ -181,7 +189,7 @@ def csv_table(path: str | Path) -> "pa.Table":
     numbers = dict.fromkeys((*COLUMNS, *TORQUES), pa.float64())
     try:
         table = csv.read_csv(opened(path), convert_options=csv.ConvertOptions(column_types=numbers))
-        table.column_names  # noqa: B018, which decodes them
+        table.column_names  # noqa: B018, decodes the names
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (pa.ArrowInvalid, UnicodeDecodeError) as error:
@@ -190,29 +198,35 @@ def csv_table(path: str | Path) -> "pa.Table":
 
 
 def opened(path: str | Path) -> "pa.OSFile":
-    """A file for pyarrow, which takes no name with bytes that are not UTF-8.
+    """Open a file for pyarrow, which does not accept a name that is not UTF-8.
 
     Raises:
-        OSError: it cannot be opened.
+        OSError: the file cannot be opened.
     """
     import pyarrow as pa
 
-    open(path, "rb").close()  # pyarrow's own words for what is wrong are longer
+    open(path, "rb").close()  # its errors are shorter than pyarrow's
     return pa.OSFile(os.fsencode(path))
 
 
 def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, with_torques: bool = False) -> dict[str, Array]:
-    """t (n,) and q, and qd, qdd and where asked for tau, as far as they are there, (n, 5) each, of a motion's table.
+    """Return the quantities in a motion's table.
+
+    They are t (n,) and q (n, 5), and those of qd, qdd and (with `with_torques`) tau (n, 5) that the
+    table has.
 
     Args:
-        first: what a message calls the first sample.
+        path: the file, for messages.
+        table: the table.
+        first: name of the first sample in messages.
+        with_torques: whether to read tau. If not, tau may contain NaN.
 
     Raises:
-        InputError: a column is missing, twice there or not known, or a value is not a finite number or not plausible; a
-            torque that is not asked for may be NaN.
+        InputError: a column is missing, repeated or unknown, or a value is not finite or
+            implausible.
     """
     names = set(table.column_names)
-    _complain(path, "has twice the column", {name for name, count in Counter(table.column_names).items() if count > 1})
+    _complain(path, "repeats the column", {name for name, count in Counter(table.column_names).items() if count > 1})
     looked_for = (*_QUANTITIES, "tau") if with_torques else _QUANTITIES
     found = [name for name in looked_for if name == "q" or any(f"{name}{i}" in names for i in range(1, 6))]
     needed = {"t", *(f"{name}{i}" for name in found for i in range(1, 6))}
@@ -231,10 +245,13 @@ def quantities(path: str | Path, table: "pa.Table", first: str = "line 2", *, wi
 
 
 def trajectory_of(path: str | Path, data: dict[str, Array], notes: tuple[str, ...] = ()) -> Trajectory:
-    """The motion in a file's quantities; a spline gives qd and qdd where neither is there.
+    """Return the motion given by a file's quantities.
+
+    If qd and qdd are both missing, a cubic spline through q supplies them.
 
     Raises:
-        InputError: only one of qd and qdd, no samples, times that do not increase, or too few samples for the spline.
+        InputError: only one of qd and qdd is there, there are no samples or too few for the spline,
+            or the times do not increase.
     """
     given = [name for name in ("qd", "qdd") if name in data]
     if len(given) == 1:
@@ -264,4 +281,6 @@ def _complain(path: str | Path, what: str, names: set[str]) -> None:
     if names:
         shown = sorted(names)[:_SHOWN]
         more = f" and {len(names) - _SHOWN:,} more" if len(names) > _SHOWN else ""
-        raise InputError(f"{path}: {what} {', '.join(shown)}{more}; a motion has {','.join(COLUMNS)} or its first six")
+        raise InputError(
+            f"{path}: {what} {', '.join(shown)}{more}; a motion has the columns {','.join(COLUMNS)}, or the first six of them"
+        )

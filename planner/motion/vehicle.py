@@ -1,4 +1,4 @@
-"""What the vehicle does to the boom's mount during a move: tilt on a slope, a sinusoidal track, a half-sine shock."""
+"""Vehicle cases: slope, sinusoidal track and half-sine shock move the mount during a move."""
 
 from dataclasses import dataclass
 from importlib.resources import files
@@ -33,10 +33,10 @@ _Direction = Annotated[list[Annotated[float, DIRECTION]], Field(min_length=3, ma
 
 @dataclass(frozen=True)
 class VehicleCase:
-    """A load case of the vehicle; its parts add up. Angles in rad, the rest in SI.
+    """Load case of the vehicle, the sum of slope, track and shock, in SI units and rad.
 
-    The mount follows the ground point by point: wheelbase, tyres and the mount's own place on the vehicle are left out. The
-    forward speed is constant, along the track as seen from above.
+    The mount follows the ground point by point; wheelbase, tyres and the position of the mount on
+    the vehicle are neglected. The horizontal speed along the track is constant.
     """
 
     name: str
@@ -56,7 +56,7 @@ class VehicleCase:
     direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
     """Unit vector along frame 1."""
     shock_events: float | None = None
-    """How many such shocks the drives are to survive; None where nobody says."""
+    """Number of such shocks that the drives must survive; None if unknown."""
 
     @property
     def is_level(self) -> bool:
@@ -65,22 +65,22 @@ class VehicleCase:
 
     @property
     def tilt(self) -> BaseMotion | None:
-        """The slope alone, which planning accounts for; None on level ground."""
+        """Slope of the base, the only part that planning accounts for; None on level ground."""
         level = self.roll == 0.0 and self.pitch == 0.0
         return None if level else BaseMotion.of(up=up_on_slope(self.roll, self.pitch))
 
     def base(self, t: ArrayLike) -> BaseMotion | None:
-        """`base_motion` at times t (n,); None at rest on level ground."""
+        """Return `base_motion` at times t (n,), or None at rest on level ground."""
         return None if self.is_level else base_motion(self, t)
 
     @property
     def is_steady(self) -> bool:
-        """Whether it is a tilt alone, which does not change with time."""
+        """Whether the case is a slope only, which does not change with time."""
         return (self.amplitude == 0.0 or self.speed == 0.0) and self.peak == 0.0
 
     @property
     def sentence(self) -> str:
-        """What a report says of it."""
+        """Description of the case for a report."""
         parts = []
         if self.roll or self.pitch:
             parts.append(f"slope: roll {np.degrees(self.roll):g} deg, pitch {np.degrees(self.pitch):g} deg")
@@ -93,14 +93,14 @@ class VehicleCase:
 
 
 LEVEL = VehicleCase("level ground", Origin(Basis.PRINTED, "the vehicle rests on level ground"))
-"""What a move is planned and checked on where no other case is given."""
+"""Default case for planning and checks."""
 
 
 def base_motion(case: VehicleCase, t: ArrayLike) -> BaseMotion:
-    """How the case moves the base at times t (n,) [s].
+    """Return the motion of the base in a vehicle case at times t (n,) [s].
 
-    With ground slope psi = atan(dz/dx) along the track the nose rises by psi, so that pitch = slope's pitch - psi; heave is
-    z(t), and its acceleration points against gravity.
+    With the slope psi = atan(dz/dx) of the track, the nose rises by psi, so the pitch of the base
+    is case.pitch - psi. Heave is z(t), along `up`, and so is its acceleration.
 
     Raises:
         InputError: t is not finite.
@@ -116,7 +116,7 @@ def base_motion(case: VehicleCase, t: ArrayLike) -> BaseMotion:
     psi_2 = steepness_2 / level - 2.0 * steepness * steepness_1**2 / level**2
     heave_1 = steepness * case.speed
     heave_2 = -case.amplitude * np.sin(phase) * (k * case.speed) ** 2
-    ahead, left, up = np.moveaxis(base_pose(case, t)[..., :3, :3], -2, 0)  # the ground's axes along frame 1
+    ahead, left, up = np.moveaxis(base_pose(case, t)[..., :3, :3], -2, 0)  # axes of the ground in frame 1
     pulse = np.sin(np.pi * (t - case.shock_start) / case.shock_duration)
     inside = (t >= case.shock_start) & (t <= case.shock_start + case.shock_duration)
     shock = np.where(inside, case.peak * pulse, 0.0)[..., None] * np.asarray(case.direction)
@@ -130,7 +130,7 @@ def base_motion(case: VehicleCase, t: ArrayLike) -> BaseMotion:
 
 
 def base_pose(case: VehicleCase, t: ArrayLike) -> Array:
-    """T_ground_1 (n, 4, 4) at times t (n,): tilt and heave, without the way ahead.
+    """Return T_ground_1 (n, 4, 4) at times t (n,): tilt and heave, without the forward travel.
 
     Raises:
         InputError: t is not finite.
@@ -178,15 +178,16 @@ class _CaseTable(Table):
 
 
 def named_cases() -> tuple[str, ...]:
-    """Names of the cases that come with the toolkit."""
+    """Return the names of the cases that come with the toolkit."""
     return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
 
 
 def load_case(name: str) -> VehicleCase:
-    """A named case, or one from a TOML file of the same form (a name that ends in .toml).
+    """Load a named case, or one from a TOML file of the same form (a name that ends in .toml).
 
     Raises:
-        InputError: no such case, or the file cannot be read or is malformed; the key is named.
+        InputError: the case is unknown, or the file cannot be read or is malformed; the message
+            names the key.
     """
     path = named_file(_FOLDER, name, "vehicle case")
     table = read_toml(path, _CaseTable)

@@ -1,0 +1,1 @@
+"""Paths of a move: joint lines, splines through waypoints, and curves of the tip."""

@@ -1,6 +1,7 @@
-"""How near the arm comes to what it must keep away from.
+"""Distance between the arm and the shapes that it must keep away from.
 
-Distances are coal's, the collision library of Pinocchio. It is an extra, keep-out: it is large, and most booms have no shapes.
+Distances come from coal, the collision library of Pinocchio. It is an extra, keep-out, because it
+is large and most booms have no shapes.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ from boom_model.kinematics.frames import frame_transforms
 from planner.paths.path import Path
 
 LINKS = ("lower", "outer", "upper", "inner", "actuator", "end effector", "payload")
-"""The parts of the arm: a line between two pins each, the payload the point of the tip."""
+"""Parts of the arm. Each is a line between two pins, except the payload, a point at the tip."""
 
 _RESOLUTION = 1e-3  # [m]
 _ROUGH = 1001
@@ -28,18 +29,18 @@ _CLOSER = 0.01  # [m]
 
 @dataclass(frozen=True)
 class Clearance:
-    """Where the arm comes nearest to a shape."""
+    """Nearest approach of the arm to a shape."""
 
     distance: float
-    """[m], negative where they overlap"""
+    """[m], negative where they overlap."""
     link: str
     shape: str
     s: float = 0.0
-    """Where on the path."""
+    """Parameter of the path there."""
 
 
 def link_lines(boom: Boom, q: Array) -> Array:
-    """Both ends of each of LINKS in frame 1, shape (..., 7, 2, 3) [m]."""
+    """Return both ends of each of LINKS in frame 1, shape (..., 7, 2, 3) [m]."""
     outer = frame_transforms(boom, q, "outer")[..., :3, 3]
     inner = frame_transforms(boom, q, "inner")[..., 4, :3, 3]
     five, six, seven, eight, wrist, tip = (outer[..., i, :] for i in (4, 5, 6, 7, 9, 10))
@@ -48,16 +49,23 @@ def link_lines(boom: Boom, q: Array) -> Array:
 
 
 def clearance(boom: Boom, q: Array) -> Clearance:
-    """The nearest approach of the arm at q (5,) to a shape of `boom.keep_out`, which must be given.
+    """Return the nearest approach of the arm at q (5,) to a shape of `boom.keep_out`.
+
+    `boom.keep_out` must not be None.
 
     Raises:
-        InputError: coal is not installed; names the extra that brings it. So do all functions here that measure distances.
+        InputError: coal is not installed; the message names the extra that brings it. This holds
+            for every function here that measures distances.
     """
     return _nearest(boom, _distances(boom, q[None])[0])
 
 
 def least_clearance(boom: Boom, path: Path) -> Clearance:
-    """The nearest approach along a path, seen at points between which no point of the arm moves more than a millimetre."""
+    """Return the nearest approach along a path.
+
+    The path is sampled so finely that no point of the arm moves more than 1 mm between two samples,
+    up to 20,000 samples.
+    """
     rough = path(np.linspace(0.0, 1.0, _ROUGH))
     count = int(np.clip(_travel(boom, rough)[-1] / _RESOLUTION, 1, _MOST_POINTS)) + 1
     s = np.linspace(0.0, 1.0, count)
@@ -66,10 +74,12 @@ def least_clearance(boom: Boom, path: Path) -> Clearance:
 
 
 def nearest_approach(boom: Boom, q: Array) -> tuple[int, Clearance]:
-    """The sample of a motion (n, 5) at which the arm comes nearest to a shape, to a centimetre where it is clear.
+    """Return the sample of a motion q (n, 5) at which the arm is nearest to a shape, and how near.
 
-    Only samples are looked at between which the arm, however it moves, could come nearer than the clearance, or nearer by a
-    centimetre than the nearest so far.
+    The distance is exact if it is below the clearance, else to 1 cm. Between two examined samples,
+    a bound on the arm's travel tells how near it could come. The samples between are examined only
+    if that is below the smallest distance so far (once this violates the clearance), or else below
+    the clearance or more than 1 cm below the smallest distance so far.
     """
     keep = boom.keep_out
     assert keep is not None
@@ -92,15 +102,15 @@ def nearest_approach(boom: Boom, q: Array) -> tuple[int, Clearance]:
 
 
 def _travel(boom: Boom, q: Array) -> Array:
-    """(n,) the farthest that a point of the arm can have moved since the first of the positions q (n, 5) [m]."""
+    """Return a bound (n,) [m] on the travel of any point of the arm since the first of q (n, 5)."""
     return np.append(0.0, np.cumsum(np.abs(np.diff(q, axis=0)) @ _reach(boom)))
 
 
 def require_clear(boom: Boom, q: Array, name: str) -> None:
-    """Whether a pose keeps away from every shape, where any is given.
+    """Check that a pose keeps the clearance to every shape, if the boom has shapes.
 
     Raises:
-        InfeasibleError: it does not; names the link, the shape and the distance.
+        InfeasibleError: it does not; the message names the link, the shape and the distance.
     """
     if boom.keep_out is None:
         return
@@ -110,23 +120,26 @@ def require_clear(boom: Boom, q: Array, name: str) -> None:
 
 
 def require_path_clear(boom: Boom, path: Path) -> None:
-    """Whether a path keeps away from every shape, where any is given.
+    """Check that a path keeps the clearance to every shape, if the boom has shapes.
 
     Raises:
-        InfeasibleError: it does not; names the place, the link, the shape and the distance.
+        InfeasibleError: it does not; the message names the place on the path, the link, the shape
+            and the distance.
     """
     if boom.keep_out is None:
         return
     found = least_clearance(boom, path)
     if found.distance < boom.keep_out.clearance:
-        raise InfeasibleError(f"at {found.s:.1%} of the path {sentence(boom, found)}; a path of this kind is not led round")
+        raise InfeasibleError(
+            f"at {found.s:.1%} of the path {sentence(boom, found)}; detours are planned for straight joint moves only"
+        )
 
 
 def sentence(boom: Boom, found: Clearance) -> str:
-    """What a nearest approach says against the clearance that is asked for."""
+    """Describe a nearest approach and the required clearance."""
     assert boom.keep_out is not None
     how = f"comes within {found.distance * 1e3:.0f} mm of" if found.distance > 0.0 else "runs into"
-    return f"the {found.link} {how} the {found.shape}, where {boom.keep_out.clearance * 1e3:.0f} mm are to be kept"
+    return f"the {found.link} {how} the {found.shape}; the required clearance is {boom.keep_out.clearance * 1e3:.0f} mm"
 
 
 def _nearest(boom: Boom, distances: Array) -> Clearance:
@@ -137,7 +150,7 @@ def _nearest(boom: Boom, distances: Array) -> Clearance:
 
 @lru_cache(maxsize=8)
 def _reach(boom: Boom) -> Array:
-    """(5,) the farthest that a point of the arm moves with each joint, per rad or m."""
+    """Return a bound (5,) on how far any point of the arm moves per rad or m of each joint."""
     g, keep = boom.geometry, boom.keep_out
     assert keep is not None
     tip = g.L8 + max(keep.payload_radius, keep.link_radius)
@@ -148,7 +161,7 @@ def _reach(boom: Boom) -> Array:
 
 
 def _distances(boom: Boom, q: Array) -> Array:
-    """Distance [m] of every link to every shape at q (n, 5): (n, 7, shapes)."""
+    """Return the distance [m] of every link to every shape at q (n, 5), shape (n, 7, shapes)."""
     coal, keep = _coal(), boom.keep_out
     assert keep is not None
     still = [_solid(coal, shape) for shape in keep.shapes]
@@ -168,21 +181,24 @@ def _coal() -> ModuleType:
         import coal
     except ModuleNotFoundError:
         raise InputError(
-            "the boom's file has shapes to keep away from (keep_out), which need the extra keep-out: "
+            "the boom's file has keep_out shapes, which need the extra keep-out: "
             "run pip install '.[keep-out]' in the folder of boom"
         ) from None
     return cast(ModuleType, coal)
 
 
 def _solid(coal: ModuleType, shape: Box | Capsule) -> tuple[Any, Any]:
-    """coal's shape and where it is."""
+    """Return the shape and its pose as coal's objects."""
     if isinstance(shape, Capsule):
         return _rounded(coal, shape.start, shape.end, shape.radius)
     return coal.Box(*shape.size), coal.Transform3s(np.eye(3), shape.center)
 
 
 def _rounded(coal: ModuleType, start: Array, end: Array, radius: float) -> tuple[Any, Any]:
-    """The capsule about a line, or the ball about a point, and where it is; coal's capsule lies along z."""
+    """Return the capsule about a line, or the ball about a point, and its pose, as coal's objects.
+
+    The axis of coal's capsule is z.
+    """
     axis = end - start
     length = float(np.linalg.norm(axis))
     middle = (start + end) / 2.0

@@ -1,4 +1,4 @@
-"""From targets to the paths between their stops."""
+"""Paths between the stops of a move, from its targets."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -19,7 +19,7 @@ from planner.paths.tip_curves import TipArc, TipLine
 from planner.paths.tip_path import TipPath, follow
 
 Along = Literal["joint", "line"] | ArrayLike
-"""What leads a move: the joints, or the tip on a line or on an arc through a point."""
+"""Kind of path: straight in the joints, a line of the tip, or an arc of the tip through a point."""
 
 
 def legs(
@@ -31,27 +31,37 @@ def legs(
     stops: bool,
     reference: ArrayLike | None = None,
 ) -> tuple[list[Path], tuple[str, ...]]:
-    """A path between each stop and the next, on branches that go on from each other, and what a report says of them.
+    """Return the paths from stop to stop, and notes about them for the report.
 
-    There is none between equal positions. Where the boom has shapes to keep away from, straight joint moves are led round
-    them by way of poses that the notes name; other paths are refused where they come too near.
+    Each path starts where the previous one ends, on the same branch. Equal consecutive positions
+    produce no path. If the boom has shapes to keep away from, straight joint moves are planned
+    around them, through poses that the notes name. Any other path that comes too near to a shape is
+    refused.
 
     Args:
-        stops: whether the targets between the first and the last are stops; else one smooth path goes through them.
-        reference: joint position (5,) that the start of a tip line or arc is nearest to; None is the middle of the ranges.
+        boom: the boom.
+        targets: start, targets on the way, and goal.
+        pitch: of the end effector at tip targets [rad]; None lets the constraint choose it.
+        constraint: the extra constraint of tip targets.
+        along: kind of path.
+        stops: whether the move stops at the targets on the way. If not, one smooth path goes
+            through them.
+        reference: (5,) joint position that selects the branch at the start of a tip line or arc.
+            None is the middle of the joint ranges.
 
     Raises:
-        InputError: what leads the move does not fit the targets.
-        InfeasibleError: a target or a path is out of reach, outside the limits or too near to a shape.
+        InputError: the kind of path does not fit the targets.
+        InfeasibleError: a target or a path is out of reach, outside the limits or too near to a
+            shape.
     """
     if isinstance(along, str) and along == "joint":
         paths, notes = _joint_paths(boom, targets, pitch, constraint, stops)
     else:
         if not stops:
-            raise InputError("a move through targets without a stop is led by the joints, not by a line or an arc of the tip")
+            raise InputError("targets can be passed without a stop on a joint path only, not on a line or an arc of the tip")
         paths, notes = _tip_paths(boom, targets, pitch, constraint, along, reference), ()
     for path in paths:
-        if not isinstance(path, JointLine):  # a straight move is on a way that has been found clear
+        if not isinstance(path, JointLine):  # straight joint moves are clear already: see `detour`
             require_path_clear(boom, path)
     return paths, (*notes, *(path.sentence for path in paths if isinstance(path, TipPath | SplinePath)))
 
@@ -71,7 +81,7 @@ def _joint_paths(
     for a, b in pairwise(places):
         way = detour(boom, a, b)
         paths += [JointLine(*pair) for pair in pairwise(way)]
-        notes += [f"led round what the arm must keep away from, with a stop at {_shown(q)}" for q in way[1:-1]]
+        notes += [f"detour around the shapes to keep away from, with a stop at {_shown(q)}" for q in way[1:-1]]
     return paths, tuple(notes)
 
 
@@ -86,9 +96,9 @@ def _tip_paths(
     if isinstance(along, str) and along != "line":
         raise InputError(f"along is {along!r}; it must be 'joint', 'line' or a point of an arc")
     if not isinstance(along, str) and len(targets) != 2:
-        raise InputError("an arc goes from one tip target to another, with no stop on the way")
+        raise InputError("an arc connects two tip targets; it takes no targets on the way")
     if pitch is None:
-        raise InputError("a line or an arc of the tip goes at constant pitch, which must be given")
+        raise InputError("a line or an arc of the tip has a constant pitch, which must be given")
     paths: list[Path] = []
     last = reference
     for a, b in pairwise([_place(target) for target in targets]):
@@ -103,7 +113,7 @@ def _tip_paths(
 
 def _place(target: Target) -> Array:
     if not isinstance(target, TipTarget):
-        raise InputError(f"{target!r} is no tip target; a line or an arc of the tip goes between tip targets")
+        raise InputError(f"{target!r} is not a tip target; a line or an arc of the tip connects tip targets")
     return checked("tip target", target.position)
 
 

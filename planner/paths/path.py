@@ -1,4 +1,4 @@
-"""Paths parametrised by s from 0 to 1: straight in joint space, or through waypoints on a spline."""
+"""Paths over s from 0 to 1: a straight line in joint space, or a spline through waypoints."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
@@ -16,15 +16,15 @@ _LOOKS = 4001
 
 
 class Path(Protocol):
-    """A smooth map from s in [0, 1] to joint positions."""
+    """Smooth map from s in [0, 1] to joint positions."""
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Array:
-        """The derivative of the given order (0 to 3) with respect to s, shape (..., 5) for s of shape (...)."""
+        """Return the derivative of the given order (0 to 3) in s, shape (..., 5) for s (...)."""
         ...
 
     @property
     def knots(self) -> Array:
-        """Where inside (0, 1) a derivative up to the third may jump."""
+        """Values of s inside (0, 1) at which a derivative up to the third may jump."""
         ...
 
 
@@ -32,13 +32,15 @@ class Path(Protocol):
 class JointLine:
     """Straight line in joint space, q(s) = start + s (goal - start).
 
-    Every position limit, the coupled one included, is linear in q: a line between two poses within them stays within them.
+    Every position limit, the coupled one included, is linear in q, so a line between two poses
+    within the limits stays within them.
     """
 
     start: Array
     goal: Array
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Array:
+        """Return the derivative of the given order in s, shape (..., 5) for s (...)."""
         s = np.asarray(s, dtype=float)[..., None]
         if order == 0:
             line: Array = (1.0 - s) * self.start + s * self.goal  # exact at both ends
@@ -48,40 +50,48 @@ class JointLine:
 
     @property
     def knots(self) -> Array:
+        """Values of s at which a derivative may jump: none."""
         return np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
 class SplinePath:
-    """Joint path through waypoints without a stop, twice continuously differentiable unless said otherwise."""
+    """Joint path through waypoints without a stop.
+
+    It is twice continuously differentiable unless its maker says otherwise.
+    """
 
     spline: "PPoly"
     waypoints: Array
-    """(n, 5), start and goal included"""
+    """(n, 5), start and goal included."""
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Array:
+        """Return the derivative of the given order in s, shape (..., 5) for s (...)."""
         return np.asarray(self.spline(np.clip(s, 0.0, 1.0), order))
 
     @property
     def knots(self) -> Array:
+        """Values of s at the pieces' ends, where a derivative may jump."""
         return np.asarray(self.spline.x[1:-1])
 
     @property
     def sentence(self) -> str:
-        """What a report says of it."""
-        return f"through {len(self.waypoints) - 2} waypoint(s) without a stop, by a spline"
+        """Description of the path for a report."""
+        return f"spline through {len(self.waypoints) - 2} waypoint(s) without a stop"
 
 
 def through(boom: Boom, waypoints: Array) -> SplinePath:
-    """The joint path through waypoints (n, 5) in turn, without corners.
+    """Return a smooth joint path through waypoints (n, 5) in the given order.
 
-    A natural cubic spline whose parameter between two waypoints is in proportion to the time that the joints' top speeds need
-    there. Where it would overshoot a position limit, a quintic one with monotone (PCHIP) slopes and no curvature at the
-    waypoints, which turns back at a joint's extremes and not beyond them: without curvature at either end, a quintic is
-    monotone where both its end slopes are within 5/4 of its mean slope.
+    It is a natural cubic spline. Its parameter advances between two waypoints in proportion to the
+    time that the joints need there at top speed. If it overshoots a position limit, it is replaced
+    by a quintic spline with monotone (PCHIP) slopes and zero curvature at the waypoints, whose
+    joints do not go beyond the extreme waypoints: a quintic with zero curvature at both ends is
+    monotone if both end slopes are at most 5/4 of its mean slope.
 
     Raises:
-        InfeasibleError: both leave the position limits; names the joint, the place and the excess.
+        InfeasibleError: both splines leave the position limits; the message names the joint, the
+            place and the excess.
     """
     from scipy.interpolate import BPoly, CubicSpline, PchipInterpolator, PPoly
 
@@ -103,7 +113,11 @@ def through(boom: Boom, waypoints: Array) -> SplinePath:
 
 
 def spaced(boom: Boom, waypoints: Array) -> Array:
-    """Knots (n,) from 0 to 1, spaced as the joints' top speeds need between waypoints (n, 5)."""
+    """Return knots (n,) from 0 to 1 for waypoints (n, 5).
+
+    Their spacing is proportional to the time that the joints need from waypoint to waypoint at top
+    speed.
+    """
     needed = (np.abs(np.diff(waypoints, axis=0)) / boom.limits.velocity).max(axis=-1)
     knots: Array = np.append(0.0, np.cumsum(needed)) / needed.sum()
     knots[-1] = 1.0
@@ -111,7 +125,7 @@ def spaced(boom: Boom, waypoints: Array) -> Array:
 
 
 def overshoot(boom: Boom, path: Path) -> str | None:
-    """Where a path is farthest outside the position limits, in a sentence; None where it stays within them."""
+    """Describe where a path is farthest outside the position limits; None if it is within them."""
     s = np.linspace(0.0, 1.0, _LOOKS)
     q = path(s)
     excess = boom.limits.excess(q).max(axis=-1)

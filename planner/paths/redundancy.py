@@ -1,18 +1,21 @@
-"""Redundancy resolution along a whole curve of the tip: a smooth curve through the one-parameter self-motion.
+"""Redundancy resolution along a whole curve of the tip.
 
-At constant pitch every point of the curve leaves one joint free; theta2 is the parameter (`boom_model.kinematics.families`).
-A constraint that chooses has its best member at every point by itself, but the curve of these kinks and jumps. Here the
-choice is made for the whole curve, in four steps for each side of the base:
+At constant pitch, every point of the curve leaves a self-motion of one parameter, theta2
+(`boom_model.kinematics.families`). A choosing constraint has a best member at each point, but the
+curve of these members has kinks and jumps. Here the choice is made for the whole curve, in four
+steps for each side of the base:
 
-1. Dynamic programming over a grid (s, theta2) finds the connected curve within the limits that costs least, counting the
-   constraint's own cost and the joints' travel.
-2. Around it lies a corridor: at each s the interval of theta2 within the limits.
-3. In the corridor, the curve theta2(s) is smoothed by projected Newton steps on
+1. Dynamic programming on a grid (s, theta2) finds the connected curve of least cost within the
+   limits. The cost is that of the constraint plus a cost of joint travel.
+2. A corridor surrounds this curve: the interval of theta2 within the limits at each s.
+3. Projected Newton steps smooth theta2(s) inside the corridor. They minimise
 
-       sum of (p' / (v T))^2 + (p'' / (a T^2))^2 + (p''' / (j T^3))^2   +   weight (theta2 - wish)^2
+       sum of (q' / (v T))^2 + (q'' / (a T^2))^2 + (q''' / (j T^3))^2  +  weight (theta2 - wish)^2
 
-   with the joints' limits v, a, j. The weight is the largest of a ladder with which the curve is quick enough.
-4. *Quick enough* is measured against the curves of fixed elevation or fixed extension that exist for the same line.
+   where v, a, j are the joints' limits and `wish` is the constraint's best member. The weight is
+   the largest of a fixed list for which the curve is fast enough.
+4. A curve is fast enough if its duration is at most SLOWER times the shortest duration of the
+   curves with fixed elevation or fixed extension along the same line.
 """
 
 from collections.abc import Iterator
@@ -24,32 +27,32 @@ import numpy as np
 
 from boom_model import Boom, inverse_dynamics
 from boom_model.arrays import Array, Mask
-from boom_model.drives.drive import drive_inertia, drive_torque_limit
+from boom_model.drives.limits import rotors, static_limits
+from boom_model.golden_section import golden_section
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension
 from boom_model.kinematics.constraints import ChoosingConstraint, LeastTime
-from boom_model.kinematics.families import Targets, best_member, member
+from boom_model.kinematics.families import Targets, best_member, member, targets_at
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 NODES = 97
-"""Points of s at which theta2 is decided."""
+"""Number of values of s at which theta2 is chosen."""
 
 SLOWER = 1.15
-"""How much slower than the quickest simple curve a resolved one may be."""
+"""Largest duration of a resolved curve, as a multiple of that of the fastest simple curve."""
 
 _GRID = 161
 _STEPS = 8
-"""The most cells of theta2 that dynamic programming passes from one s to the next."""
+"""Largest number of cells of theta2 between neighbouring s in dynamic programming."""
 
 _TRAVEL = 0.05
 _WEIGHTS = (300.0, 30.0, 3.0, 0.3, 0.03, 0.0)
 _NEWTON_STEPS = 25
 _FIXED = 41
 _BISECTIONS = 30
-_SHRINK = (np.sqrt(5.0) - 1.0) / 2.0
 _SIMPLE = 3
-"""Simple curves of a side, the quickest, from which a quick one is looked for."""
+"""Number of simple curves of a side, the fastest ones, with which the search starts."""
 
 _SAME = 1e-6
 _FLAT = 1e-9
@@ -58,47 +61,47 @@ _HATS = ((5, 0.3), (9, 0.15))
 _FIRST_TRY = 0.2  # [rad]
 _TRIES = 40
 _KEPT = 5e-4
-"""[rad] by which a smoothed curve keeps away from the corridor's ends: a spline through its nodes overshoots a little."""
+"""Distance [rad] of a smoothed curve from the corridor's ends, because splines overshoot."""
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """The self-motion along the curve on one side of the base."""
+    """Self-motion along the curve on one side of the base."""
 
     boom: Boom
     points: Array
-    """(NODES, 3) of the tip, at equal steps of s"""
+    """(NODES, 3) tip positions at equal steps of s."""
     pitch: float
     front: bool
-    """Whether the yaw points towards the tip; else the arm reaches over the base."""
+    """Whether the yaw points towards the tip; else the arm reaches back over the base."""
     pinned: float | None
-    """theta2 at the start, where it is given"""
+    """theta2 at the start; None leaves it free."""
 
     @cached_property
     def targets(self) -> Targets:
+        """Targets (NODES,) of the self-motion at the tip positions."""
         return self.targets_at(self.points)
 
     def targets_at(self, points: Array) -> Targets:
-        """The self-motion's targets (n,) at tip positions (n, 3)."""
-        g, side = self.boom.geometry, 1.0 if self.front else -1.0
-        x, y, z = np.moveaxis(points, -1, 0)
-        F = side * np.hypot(x, y) - g.L2 - g.L8 * np.cos(self.pitch)
-        G = z - g.L1 - g.L8 * np.sin(self.pitch)
-        theta1 = np.arctan2(y, x) + (0.0 if self.front else np.pi)
-        return Targets(theta1, F, G, np.full_like(F, self.pitch - np.pi / 2.0))
+        """Return the self-motion's targets (n,) at tip positions (n, 3)."""
+        return targets_at(self.boom, points, self.pitch, 1.0 if self.front else -1.0)
 
     @cached_property
     def grid(self) -> Array:
+        """Values of theta2 (_GRID,) in dynamic programming."""
         return np.linspace(self.boom.limits.lower[1], self.boom.limits.upper[1], _GRID)
 
     @cached_property
     def members(self) -> Array:
-        """(NODES, _GRID, 5)"""
+        """Joint positions (NODES, _GRID, 5) on the grid (s, theta2)."""
         return self.at(np.broadcast_to(self.grid, (NODES, _GRID)))
 
     @cached_property
     def allowed(self) -> Mask:
-        """(NODES, _GRID); nothing is beyond a jump of the yaw from one end of its range to the other."""
+        """Whether each grid point is within the limits, (NODES, _GRID).
+
+        Points beyond a jump of the yaw from one end of its range to the other are not allowed.
+        """
         allowed = np.array(self.boom.limits.contain(self.members))
         yaw = self.members[:, 0, 0] if not np.isnan(self.members[:, 0, 0]).any() else np.nanmin(self.members[..., 0], axis=-1)
         jumps = np.flatnonzero(np.abs(np.diff(yaw)) > np.pi)
@@ -109,15 +112,19 @@ class Side:
         return allowed
 
     def at(self, theta2: Array) -> Array:
-        """Joint positions (NODES, k, 5) at theta2 (NODES, k), yaw without a jump."""
+        """Return joint positions (NODES, k, 5) at theta2 (NODES, k)."""
         return member(self.boom, self.targets, theta2)
 
     def curve(self, theta2: Array) -> Array:
-        """Joint positions (NODES, 5) at theta2 (NODES,)."""
+        """Return joint positions (NODES, 5) at theta2 (NODES,)."""
         return self.at(theta2[:, None])[:, 0]
 
     def connected(self, constraint: ChoosingConstraint | None) -> Array | None:
-        """The curve (NODES,) of least cost by dynamic programming; None where no connected one exists."""
+        """Return the connected curve theta2 (NODES,) of least cost, by dynamic programming.
+
+        Return None if no connected curve exists. Without a constraint, joint travel is the only
+        cost.
+        """
         allowed, q = self.allowed, self.members
         if not allowed.any(axis=-1).all():
             return None
@@ -151,7 +158,7 @@ class Side:
 
     @property
     def furthest(self) -> int:
-        """Index of the last node that a connected curve within the limits reaches from the start."""
+        """Index of the first node that no curve within the limits reaches, or of the last."""
         reached = self.allowed[0]
         for i in range(1, NODES):
             near = np.convolve(reached, np.ones(2 * _STEPS + 1), mode="same") > 0.5
@@ -161,7 +168,10 @@ class Side:
         return NODES - 1
 
     def corridor(self, theta2: Array) -> tuple[Array, Array]:
-        """The ends (NODES,) each of the interval within the limits around a curve that is within them."""
+        """Return lower and upper end (NODES,) of the interval of theta2 within the limits.
+
+        The interval is the one around theta2 (NODES,), a curve within the limits.
+        """
         ends = []
         for sign in (-1.0, 1.0):
             reach = np.where(sign < 0.0, self.grid <= theta2[:, None], self.grid >= theta2[:, None])
@@ -185,19 +195,20 @@ class Side:
         return lower, upper
 
     def wished(self, constraint: ChoosingConstraint, theta2: Array, lower: Array, upper: Array) -> Array:
-        """The constraint's best member (NODES,) within a cell of a curve and its corridor, by golden section."""
+        """Return the constraint's best member theta2 (NODES,) near a curve, by golden section.
+
+        It is at most one grid cell from the curve and inside the corridor.
+        """
         cell = self.grid[1] - self.grid[0]
-        a, b = np.clip(theta2 - cell, lower, upper), np.clip(theta2 + cell, lower, upper)
-        for _ in range(_BISECTIONS):
-            c, d = b - _SHRINK * (b - a), a + _SHRINK * (b - a)
-            cost = constraint.cost(self.boom, self.at(np.stack([c, d], axis=-1)))
-            left = cost[:, 0] <= cost[:, 1]
-            a, b = np.where(left, a, c), np.where(left, d, b)
-        best: Array = (a + b) / 2.0
-        return best
+
+        def cost(theta2: Array) -> Array:
+            return constraint.cost(self.boom, self.at(theta2))
+
+        low, high = np.clip(theta2 - cell, lower, upper), np.clip(theta2 + cell, lower, upper)
+        return golden_section(cost, low, high, _BISECTIONS)
 
     def fixed(self) -> Array:
-        """Curves (k, NODES) of fixed elevation or fixed extension that stay within the limits all along."""
+        """Return curves theta2 (k, NODES) of fixed elevation or extension within the limits."""
         limits, g = self.boom.limits, self.boom.geometry
         _, F, G, _ = self.targets
         found = []
@@ -218,8 +229,8 @@ class Side:
         return kept
 
     def smoothed(self, theta2: Array, wish: Array, weight: float, lower: Array, upper: Array) -> Array:
-        """The curve in the corridor with the least sum of the module's docstring."""
-        scale = 0.1  # [rad] a departure that counts as much as a limit that is reached
+        """Return the curve theta2 (NODES,) in the corridor of least objective (see the module)."""
+        scale = 0.1  # [rad] a departure that counts as much as reaching a limit
         x = np.clip(theta2, lower, upper)
         T = float(durations(self.boom, self.curve(x)).max())
         rows = _rows(self.boom, T)
@@ -264,21 +275,14 @@ class Side:
 
 
 def _rows(boom: Boom, T: float) -> list[tuple[Array, Array]]:
-    """Difference matrices of the first three derivatives, each with the joints' limits at duration T."""
-    D1 = _difference()
+    """Return difference matrices of three derivatives, each with its limits at duration T."""
     limits = boom.limits
-    D2 = np.diff(np.eye(NODES), 2, axis=0) * (NODES - 1) ** 2
-    D3 = np.diff(np.eye(NODES), 3, axis=0) * (NODES - 1.0) ** 3
+    D1, D2, D3 = (np.diff(np.eye(NODES), order, axis=0) * (NODES - 1.0) ** order for order in (1, 2, 3))
     return [(D1, limits.velocity * T), (D2, limits.acceleration * T**2), (D3, limits.jerk * T**3)]
 
 
-def _difference() -> Array:
-    D: Array = np.diff(np.eye(NODES), axis=0) * (NODES - 1.0)
-    return D
-
-
 def durations(boom: Boom, q: Array) -> Array:
-    """(..., 3) durations of curves (..., NODES, 5): cubic, quintic, and quintic with limited jerk."""
+    """Return durations (..., 3) of curves (..., NODES, 5): cubic, quintic, jerk-limited quintic."""
     limits = boom.limits
     d1, d2, d3 = _derivatives(q)
     s = np.linspace(0.0, 1.0, NODES)
@@ -315,27 +319,27 @@ def _derivatives(q: Array) -> tuple[Array, Array, Array]:
 
 
 def travel_time(boom: Boom, q: Array) -> Array:
-    """Least time (...) of curves (..., NODES, 5) under joint velocity and acceleration and the drives' torque at standstill.
+    """Return the least travel time (...) of curves (..., NODES, 5).
 
-    With x = s'^2 and u = s'' every limit reads |A u + B x + C| <= L (`planner.timing.path_limits`). A backward and a forward
-    pass over s give the largest x. Infinite where a drive cannot hold its load.
+    The limits are joint velocity, joint acceleration and the drives' torque at standstill. With
+    x = s'^2 and u = s'', each limit has the form |A u + B x + C| <= L
+    (`planner.timing.path_limits`). A backward and a forward pass over s give the largest x. The
+    time is infinite if a drive cannot hold the static load.
     """
     d1, d2, _ = _derivatives(q)
     zero = np.zeros_like(q)
     still, pushed, carried = (
         inverse_dynamics(boom, q, qd, qdd, reactions=False).tau for qd, qdd in ((zero, zero), (zero, d1), (d1, d2))
     )
-    rotors = np.array([drive_inertia(drive) if drive else 0.0 for drive in boom.drives])
-    known = [None if drive is None else drive_torque_limit(drive, 0.0) for drive in boom.drives]
-    drives = np.array([np.inf if limit is None else float(limit) for limit in known])
+    inertia, drives = rotors(boom), static_limits(boom)
     driven = np.isfinite(drives)
-    A = np.concatenate([d1, (pushed - still + rotors * d1)[..., driven]], axis=-1)
-    B = np.concatenate([d2, (carried - still + rotors * d2)[..., driven]], axis=-1)
+    A = np.concatenate([d1, (pushed - still + inertia * d1)[..., driven]], axis=-1)
+    B = np.concatenate([d2, (carried - still + inertia * d2)[..., driven]], axis=-1)
     C = np.concatenate([zero, still[..., driven]], axis=-1)
     L = np.concatenate([boom.limits.acceleration, drives[driven]])
     possible = (np.abs(C) < L).all(axis=(-2, -1))
     A = np.where(np.abs(A) < _FLAT, np.where(A < 0.0, -_FLAT, _FLAT), A)
-    lower, upper = (np.where(A > 0.0, way * L - C, -way * L - C) / A for way in (-1.0, 1.0))  # u's bounds at x = 0
+    lower, upper = (np.where(A > 0.0, way * L - C, -way * L - C) / A for way in (-1.0, 1.0))  # of u at x = 0
     slope = -B / A
     step = 1.0 / (NODES - 1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -346,12 +350,12 @@ def travel_time(boom: Boom, q: Array) -> Array:
     most = np.minimum(np.minimum(most, np.where(possible[..., None], meet, 0.0)), 1e9)
     x = most.copy()
     x[..., 0] = x[..., -1] = 0.0
-    for i in range(NODES - 2, -1, -1):  # slow enough to brake for what comes
+    for i in range(NODES - 2, -1, -1):  # slow enough to brake in time
         rate = 1.0 + 2.0 * step * slope[..., i, :]
         room = x[..., i + 1, None] - 2.0 * step * lower[..., i, :]
         bound = np.where(rate > 0.0, room / np.where(rate > 0.0, rate, 1.0), np.inf).min(axis=-1)
         x[..., i] = np.clip(np.minimum(x[..., i], bound), 0.0, None)
-    for i in range(NODES - 1):  # as quick as the drives push
+    for i in range(NODES - 1):  # as fast as the limits on u allow
         push = (upper[..., i, :] + slope[..., i, :] * x[..., i, None]).min(axis=-1)
         x[..., i + 1] = np.clip(np.minimum(x[..., i + 1], x[..., i] + 2.0 * step * push), 0.0, None)
     root = np.sqrt(x)
@@ -361,10 +365,14 @@ def travel_time(boom: Boom, q: Array) -> Array:
 
 
 def sides_of(boom: Boom, points: Array, pitch: float, pinned: Array | None = None) -> list[Side]:
-    """The self-motion along tip positions (NODES, 3) at a pitch, in front of the base and behind it.
+    """Return the self-motion along a curve of the tip, in front of the base and over it.
 
     Args:
-        pinned: (5,) joint position at the first point, where it is given; it is on one side alone.
+        boom: the boom.
+        points: (NODES, 3) tip positions.
+        pitch: [rad]
+        pinned: (5,) joint position at the first point; only the side that it is on is returned.
+            None leaves the start free.
     """
     sides = [Side(boom, points, pitch, front, None) for front in (True, False)]
     if pinned is None:
@@ -375,31 +383,31 @@ def sides_of(boom: Boom, points: Array, pitch: float, pinned: Array | None = Non
 
 @dataclass(frozen=True)
 class Departure:
-    """How far a resolved curve is from what its constraint would choose at each point by itself."""
+    """Difference between a resolved curve and the constraint's best member at each point."""
 
     constraint: str
     most: float
-    """Largest difference of the constraint's cost, in the unit that `constraints` gives it."""
+    """Largest difference of the constraint's cost, in `unit`."""
     s: float
-    """Where"""
+    """Parameter of the curve at the largest difference."""
     unit: str
 
     @property
     def sentence(self) -> str:
-        """What a report says of it."""
-        return f"smoothness costs up to {self.most:.3g} {self.unit} of {self.constraint}, at {self.s:.0%} of the way"
+        """Description for a report."""
+        return f"smoothing costs {self.constraint} up to {self.most:.3g} {self.unit}, at {self.s:.0%} of the path"
 
 
 @dataclass(frozen=True, eq=False)
 class SelfMotion:
-    """The smooth curve through the self-motion that was chosen for a line: theta2(s) and the joints that follow from it."""
+    """Smooth curve through the self-motion: theta2(s) and the resulting joint positions."""
 
     side: Side
     theta2: Array
     """(NODES,) at equal steps of s"""
 
     def __call__(self, points: Array, s: Array) -> Array:
-        """Joint positions (n, 5) at s (n,), where the tip is at points (n, 3)."""
+        """Return joint positions (n, 5) at s (n,), where the tip is at points (n, 3)."""
         theta2 = self._spline(s)
         targets = self.side.targets_at(points)
         return member(self.side.boom, targets, theta2[:, None])[:, 0]
@@ -411,7 +419,10 @@ class SelfMotion:
         return make_interp_spline(np.linspace(0.0, 1.0, NODES), self.theta2, k=5)
 
     def departure(self, boom: Boom, constraint: ChoosingConstraint) -> Departure:
-        """Return how far the curve is from the constraint's own choice at each of its nodes, on the same side of the base."""
+        """Return the largest difference from the constraint's best member at the nodes.
+
+        The best member is that on the same side of the base.
+        """
         chosen, exists = best_member(boom, self.side.targets, constraint)
         q = self.side.curve(self.theta2)
         excess = constraint.cost(boom, q) - np.where(exists, constraint.cost(boom, np.where(exists[:, None], chosen, q)), 0.0)
@@ -420,17 +431,20 @@ class SelfMotion:
 
 
 def resolve(sides: list[Side], constraint: ChoosingConstraint | LeastTime, reference: Array) -> SelfMotion | None:
-    """The smooth curve nearest to a constraint's wish that is quick enough; None where no connected one exists.
+    """Return the smooth curve nearest to a constraint's choice among those that are fast enough.
+
+    If none is fast enough, return the fastest. Return None if no connected curve exists.
 
     Args:
-        sides: of the base, as `sides_of` gives them.
-        reference: (5,) joint position; of several sides that will do, the one that starts nearest to it is taken.
+        sides: of the base, from `sides_of`.
+        constraint: the choosing constraint. With LeastTime the fastest curve is returned.
+        reference: (5,) joint position; the side whose curve starts nearest to it is tried first.
     """
     seeds = _seeds(sides, None if isinstance(constraint, LeastTime) else constraint, reference)
     if isinstance(constraint, LeastTime):
         return _quickest(seeds)
     quickest = np.min([np.full(3, np.inf), *(each.durations for each in seeds)], axis=0)
-    if not np.isfinite(quickest).all():  # no simple curve exists: measure by the smoothest
+    if not np.isfinite(quickest).all():  # no simple curve exists: compare with the smoothest
         quickest = np.min([np.full(3, np.inf), *(_smoothest(each) for each in seeds)], axis=0)
     best, least = None, np.inf
     for seed in seeds:
@@ -445,13 +459,14 @@ def resolve(sides: list[Side], constraint: ChoosingConstraint | LeastTime, refer
 
 @dataclass(frozen=True, eq=False)
 class _Seed:
-    """Where a side's curves are looked for."""
+    """Starting curves of the search on one side of the base."""
 
     side: Side
     curves: list[Array]
-    """Connected curves of theta2 (NODES,) within the limits, the constraint's own first, the quickest simple ones after it."""
+    """Connected curves theta2 (NODES,) within the limits: first the constraint's own, then the
+    fastest simple ones."""
     durations: Array
-    """(3,) the least of the simple curves; infinite without one."""
+    """(3,) shortest durations of the simple curves; infinite without one."""
 
 
 def _seeds(sides: list[Side], constraint: ChoosingConstraint | None, reference: Array) -> list[_Seed]:
@@ -476,13 +491,13 @@ def _seeds(sides: list[Side], constraint: ChoosingConstraint | None, reference: 
 
 
 def _smoothest(seed: _Seed) -> Array:
-    """Durations (3,) of the smoothest curve about a side's connected one."""
+    """Return the durations (3,) of the smoothest curve around a side's connected one."""
     side, curve = seed.side, seed.curves[0]
     return durations(side.boom, side.curve(side.smoothed(curve, curve, 0.0, *side.corridor(curve))))
 
 
 def _ladder(seed: _Seed, constraint: ChoosingConstraint) -> Iterator[tuple[SelfMotion, Array]]:
-    """Curves of a side from the most faithful to the smoothest, each with its durations (3,)."""
+    """Yield curves of a side with their durations (3,), from nearest to the wish to smoothest."""
     side = seed.side
     for number, curve in enumerate(seed.curves[:2]):
         lower, upper = side.corridor(curve)
@@ -496,7 +511,10 @@ def _ladder(seed: _Seed, constraint: ChoosingConstraint) -> Iterator[tuple[SelfM
 
 
 def _quickest(seeds: list[_Seed]) -> SelfMotion | None:
-    """The curve with the least `travel_time`: the best of smoothed and simple ones, improved by a pattern search."""
+    """Return the curve of least `travel_time`; None without a starting curve.
+
+    A pattern search improves the best of the smoothed and simple curves.
+    """
     found = []
     for seed in seeds:
         for curve in seed.curves:
@@ -525,7 +543,11 @@ def _quickest(seeds: list[_Seed]) -> SelfMotion | None:
 
 
 def _time(side: Side, theta2: Array) -> Array:
-    """Comparison of curves (..., NODES): `travel_time`, or where no drive holds the load, a longer one by the joint limits."""
+    """Return a time (...) by which curves theta2 (..., NODES) are compared.
+
+    It is `travel_time`. Where a drive cannot hold the load, it is a much longer time that depends
+    on the joint limits.
+    """
     q = side.curve(theta2) if theta2.ndim == 1 else np.moveaxis(side.at(theta2.T), 0, 1)
     time = travel_time(side.boom, q)
     return np.where(np.isfinite(time), time, _HOPELESS + durations(side.boom, q).max(axis=-1))

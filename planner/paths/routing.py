@@ -1,4 +1,4 @@
-"""A way round what the arm must keep away from, by poses between which the joints go straight."""
+"""Detours around the shapes to keep away from, made of straight joint moves."""
 
 from itertools import pairwise, product
 
@@ -15,15 +15,18 @@ _MOST_CHECKS = 400
 
 
 def detour(boom: Boom, start: Array, goal: Array) -> list[Array]:
-    """The poses (5,) from start to goal, both included, between which straight joint moves keep clear of every shape.
+    """Return poses (5,) from start to goal, with straight joint moves between them that are clear.
 
-    The straight move itself where it is clear. Else the shortest way, by the time that the joints' top speeds need, over the
-    poses that take some joints' values from the start and the others' from the goal (one joint after the other), and over
-    random poses of a fixed seed (a lazy probabilistic roadmap: Bohlin and Kavraki, ICRA 2000). Every pose between limits is
-    allowed: the position limits, the coupled one included, are convex, so that no straight move between such poses breaks them.
+    Start and goal are included. If the straight move between them is clear, there are no others.
+    Else a lazy probabilistic roadmap (Bohlin and Kavraki, ICRA 2000) gives the shortest route, by
+    the time that the joints need at top speed. Its nodes are the poses that take some joints from
+    the start and the others from the goal (one joint moves after the other), and random poses from
+    a fixed seed. The position limits, the coupled one included, are convex, so every straight move
+    between poses within the limits stays within them.
 
     Raises:
-        InfeasibleError: no way was found; says what the straight move runs into, and where.
+        InfeasibleError: no route was found; the message says where the straight move comes too near
+            to which shape.
     """
     keep = boom.keep_out
     if keep is None:
@@ -44,17 +47,15 @@ def detour(boom: Boom, start: Array, goal: Array) -> list[Array]:
             way.insert(0, int(before[way[0]]))
         for a, b in pairwise(way):
             if least_clearance(boom, JointLine(nodes[a], nodes[b])).distance < keep.clearance:
-                cost[a, b] = cost[b, a] = 0.0  # what the graph takes for no edge
+                cost[a, b] = cost[b, a] = 0.0  # SciPy's graph takes 0 for "no edge"
                 break
         else:
             return [nodes[i] for i in way]
-    raise InfeasibleError(
-        f"no way round was found: on the straight joint move, at {straight.s:.1%}, {sentence(boom, straight)}"
-    )
+    raise InfeasibleError(f"no detour was found; at {straight.s:.1%} of the straight joint move {sentence(boom, straight)}")
 
 
 def _between(boom: Boom, start: Array, goal: Array, room: float) -> list[Array]:
-    """Poses within the limits that keep clear: of some joints at the start and the others at the goal, and random ones."""
+    """Return clear poses within the limits: mixtures of start and goal, and random poses."""
     rng = np.random.default_rng(_SEED)
     limits = boom.limits
     mixed = [np.where(mask, goal, start) for mask in product((False, True), repeat=5)][1:-1]

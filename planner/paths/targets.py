@@ -1,4 +1,4 @@
-"""Where a move starts and ends: a named pose, a joint position, or a tip target with a pitch and a constraint."""
+"""Targets of a move: named pose, joint position, or tip position with pitch and constraint."""
 
 from dataclasses import dataclass
 
@@ -14,20 +14,22 @@ PITCHES = {"down": -np.pi / 2.0, "level": 0.0, "up": np.pi / 2.0}
 
 @dataclass(frozen=True)
 class TipTarget:
-    """A tip position in frame 1 [m]; its pitch and constraint come with the plan."""
+    """Tip position in frame 1 [m]; the plan gives its pitch and constraint."""
 
     position: tuple[float, float, float]
 
 
 Target = str | TipTarget | ArrayLike
-"""A pose's name, a tip target, or a joint position (5,) [rad, the extension in m]."""
+"""Name of a pose, tip target, or joint position (5,) [rad, m for the extension]."""
 
 
 def parse_target(text: str) -> Target:
-    """A target as people write it: `transport`, `q=0,90,180,0,0` (degrees, the extension in m), `tip=1.4,0,1.0` (m).
+    """Parse a target, such as `transport`, `q=0,90,180,0,0` or `tip=1.4,0,1.0`.
+
+    Joint angles are in degrees; lengths are in m.
 
     Raises:
-        InputError: the numbers are malformed, not finite, or too many or too few.
+        InputError: the numbers are malformed, not finite, or the wrong count.
     """
     kind, equals, rest = text.partition("=")
     if not equals:
@@ -37,14 +39,16 @@ def parse_target(text: str) -> Target:
     if kind == "tip":
         x, y, z = numbers(text, rest, 3)
         return TipTarget((x, y, z))
-    raise InputError(f"{text!r} is no target; give a pose's name, q=DEG,DEG,DEG,M,DEG or tip=X,Y,Z")
+    raise InputError(f"{text!r} is not a target; give a pose's name, q=DEG,DEG,DEG,M,DEG or tip=X,Y,Z")
 
 
 def parse_pitch(text: str) -> float | None:
-    """A pitch as people write it: down, level, up, or degrees above the horizontal, in rad; free is None.
+    """Parse a pitch: down, level, up, free, or degrees above the horizontal.
+
+    The result is in rad; None stands for free.
 
     Raises:
-        InputError: none of these.
+        InputError: the text is none of these.
     """
     if text == "free":
         return None
@@ -54,10 +58,10 @@ def parse_pitch(text: str) -> float | None:
 
 
 def parse_along(text: str) -> str | Array:
-    """What leads a move, as people write it: joint, line, or the point of an arc, arc=X,Y,Z (m).
+    """Parse the kind of path: joint, line, or an arc through a point, arc=X,Y,Z (m).
 
     Raises:
-        InputError: none of these.
+        InputError: the text is none of these.
     """
     if text in ("joint", "line"):
         return text
@@ -68,10 +72,12 @@ def parse_along(text: str) -> str | Array:
 
 
 def parse_joint_velocity(text: str) -> Array:
-    """A joint velocity (5,) as people write it: deg/s and the extension's m/s, five numbers with commas, in SI.
+    """Parse a joint velocity: five numbers with commas, in deg/s and m/s for the extension.
+
+    The result (5,) is in SI units.
 
     Raises:
-        InputError: the numbers are malformed, not finite, or too many or too few.
+        InputError: the numbers are malformed, not finite, or the wrong count.
     """
     return joint_position(text, text)
 
@@ -79,14 +85,20 @@ def parse_joint_velocity(text: str) -> Array:
 def resolve(
     boom: Boom, target: Target, pitch: float | None, constraint: Constraint, reference: ArrayLike | None = None
 ) -> Array:
-    """The joint position (5,) of a target, within the limits.
+    """Return the joint position (5,) of a target within the limits.
 
     Args:
-        reference: joint position that a tip target's best branch is nearest to; None is the middle of the ranges.
+        boom: the boom.
+        target: what to reach.
+        pitch: of the end effector at a tip target [rad]; None lets the constraint choose it.
+        constraint: the extra constraint of a tip target.
+        reference: (5,) joint position; of a tip target's branches the nearest to it is taken. None
+            is the middle of the joint ranges.
 
     Raises:
-        InputError: no such pose, or not finite, or of the wrong shape.
-        InfeasibleError: the joint position breaks a limit, or the tip target cannot be reached within the limits.
+        InputError: the pose is unknown, or an array is not finite or has the wrong shape.
+        InfeasibleError: the joint position exceeds a limit, or the tip target cannot be reached
+            within the limits.
     """
     if isinstance(target, TipTarget):
         return _tip(boom, target, pitch, constraint, reference)
@@ -108,7 +120,9 @@ def _tip(boom: Boom, target: TipTarget, pitch: float | None, constraint: Constra
 
 
 def unreachable(boom: Boom, position: ArrayLike, pitch: float | None, constraint: Constraint) -> str:
-    """Why no branch within the limits reaches a target: how far out of reach, or which limits each branch breaks.
+    """Explain why no branch within the limits reaches a target.
+
+    The text says how far the target is out of reach, or which limits each branch exceeds.
 
     Raises:
         InputError: position is not finite or not (3,).

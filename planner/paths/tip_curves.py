@@ -17,35 +17,39 @@ class TipLine:
     goal: Array
 
     def __call__(self, s: Array) -> Array:
-        """Positions (..., 3) at s (...)."""
+        """Return positions (..., 3) at s (...)."""
         s = np.asarray(s, dtype=float)[..., None]
         line: Array = (1.0 - s) * self.start + s * self.goal
         return line
 
     @property
     def length(self) -> float:
+        """Length [m]."""
         return float(np.linalg.norm(self.goal - self.start))
 
 
 @dataclass(frozen=True, eq=False)
 class TipArc:
-    """Arc of a circle of the tip, at constant speed: center + radius (cos(s angle) first + sin(s angle) second)."""
+    """Arc of a circle of the tip, traversed at constant speed in s.
+
+    position(s) = center + radius (cos(s angle) first + sin(s angle) second)
+    """
 
     center: Array
     first: Array
     """(3,) unit vector from the center to the start"""
     second: Array
-    """(3,) unit vector across it in the circle's plane, the way the arc starts"""
+    """(3,) unit vector in the circle's plane along the direction of travel at the start"""
     radius: float
     angle: float
     """[rad]"""
 
     @staticmethod
     def through(start: ArrayLike, via: ArrayLike, goal: ArrayLike) -> "TipArc":
-        """The arc from start by via to goal, (3,) each [m].
+        """Return the arc from start through via to goal, (3,) each [m].
 
         Raises:
-            InputError: not finite, or the three lie on a line.
+            InputError: a point is not finite, or the three points lie on a line.
         """
         a, b, c = (checked(name, p, 3) for name, p in (("start", start), ("via", via), ("goal", goal)))
         u, v = b - a, c - a
@@ -61,13 +65,14 @@ class TipArc:
         return TipArc(read_only(center), read_only(first), read_only(second), radius, angle)
 
     def __call__(self, s: Array) -> Array:
-        """Positions (..., 3) at s (...)."""
+        """Return positions (..., 3) at s (...)."""
         turn = np.asarray(s, dtype=float)[..., None] * self.angle
         arc: Array = self.center + self.radius * (np.cos(turn) * self.first + np.sin(turn) * self.second)
         return arc
 
     @property
     def length(self) -> float:
+        """Length [m]."""
         return self.radius * self.angle
 
 

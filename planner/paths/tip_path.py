@@ -18,6 +18,7 @@ from boom_model import (
     solve_branches,
 )
 from boom_model.arrays import Array, Mask, checked, scalar
+from planner.bisection import bisect
 from planner.paths.redundancy import NODES, Departure, resolve, sides_of
 from planner.paths.targets import unreachable
 from planner.paths.tip_curves import TipCurve, TipLine
@@ -26,39 +27,48 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 TIP_TOLERANCE = 1e-5
-"""How far [m] a spline may leave its line; a tenth of what a sweep is asked to keep."""
+"""Largest allowed distance [m] of a spline from its curve, a tenth of the tolerance of a sweep."""
 
 _NODES = (64, 128, 256, 512, 1024, 2048)
+_FEWEST = 6
+"""Number of steps of the shortest curves. Nodes closer than the tolerance add nothing to a spline
+but rounding, which a third derivative enlarges with the cube of their number."""
+
 _CHECKS_PER_NODE = 8
 _BISECTIONS = 50
 _SAME = 1e-6  # [m, rad]
-_INSET = 1e-4 * np.array([0.0, 1.0, 1.0, 1.0, 1.0])  # [rad or m]; a target leaves no choice of yaw
+_INSET = 1e-4 * np.array([0.0, 1.0, 1.0, 1.0, 1.0])  # [rad or m]; the target determines the yaw
 _FLIP = 0.25
-"""A step between neighbouring nodes of more than this, as a share of a joint's range, is a flip to another branch."""
+"""Step between nodes, as a share of a joint's range, above which the branch has changed."""
 
 
 @dataclass(frozen=True, eq=False)
 class TipPath:
-    """Joint path that follows a curve of the tip at constant pitch: a quintic spline through exact inverse kinematics."""
+    """Joint path along which the tip follows a curve at constant pitch.
+
+    It is a quintic spline through exact solutions of the inverse kinematics.
+    """
 
     curve: TipCurve
     pitch: float
     spline: "BSpline"
     deviation: float
-    """Largest distance [m] of the tip from the curve, on a grid eight times as fine as the spline's nodes."""
+    """Largest distance [m] of the tip from the curve, on a grid 8 times finer than the nodes."""
     departure: Departure | None = None
-    """How far the joints are from the constraint's own choice; None of a constraint that leaves no choice."""
+    """Distance of the joints from the constraint's own choice; None for a fixing constraint."""
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Array:
+        """Return the derivative of the given order in s, shape (..., 5) for s (...)."""
         return np.asarray(self.spline(np.clip(s, 0.0, 1.0), order))
 
     @property
     def knots(self) -> Array:
-        return np.empty(0)  # of a quintic spline the fourth derivative is continuous
+        """Values of s at which a derivative up to the third may jump: none."""
+        return np.empty(0)  # the fourth derivative of a quintic spline is continuous
 
     @property
     def sentence(self) -> str:
-        """What a report says of it."""
+        """Description of the path for a report."""
         kind = "line" if isinstance(self.curve, TipLine) else "arc"
         followed = f"the tip follows a {kind} of {self.curve.length:.4g} m to within {self.deviation * 1e3:.3g} mm"
         return followed if self.departure is None else f"{followed}; {self.departure.sentence}"
@@ -72,21 +82,26 @@ def follow(
     reference: ArrayLike | None = None,
     tolerance: float = TIP_TOLERANCE,
 ) -> TipPath:
-    """The joint path along a curve of the tip, on one branch from end to end.
+    """Return the joint path along a curve of the tip, on one branch from end to end.
 
-    The branch is the one nearest to `reference` at the start, and from node to node the one nearest to the last. Nodes are
-    doubled until the tip stays within `tolerance` of the curve between them.
+    The branch at the start is the nearest to `reference` from which the whole curve can be
+    followed. From node to node, the nearest branch is taken. The number of nodes is doubled until
+    the tip stays within `tolerance` of the curve between them.
 
     Args:
-        pitch: of the end effector all along [rad].
-        constraint: applied at every node or, where it chooses, to the whole curve (`redundancy`).
-        reference: (5,); None is the middle of the joint ranges.
-        tolerance: [m]
+        boom: the boom.
+        curve: of the tip.
+        pitch: constant pitch of the end effector [rad].
+        constraint: a fixing constraint applies at every node. A choosing constraint is resolved for
+            the whole curve (`redundancy`).
+        reference: (5,) joint position; None is the middle of the joint ranges.
+        tolerance: largest distance of the tip from the curve [m].
 
     Raises:
-        InputError: pitch is not finite.
-        InfeasibleError: the curve leaves the reach (where), forces a flip to another branch (where), or no spline within
-            2048 nodes keeps the tolerance (the constraint's choice jumps or kinks).
+        InputError: pitch or reference is not finite.
+        InfeasibleError: the curve leaves the workspace, the branch must change on the way (the
+            message says where), or no spline of up to 2048 nodes keeps the tolerance, because the
+            constraint's choice jumps or has a kink.
     """
     pitch = scalar("pitch", pitch)
     limits = boom.limits
@@ -103,10 +118,14 @@ def follow(
 def _fitted(
     boom: Boom, curve: TipCurve, pitch: float, constraint: Constraint, nodes: Callable[[Array], Array], tolerance: float
 ) -> TipPath:
-    """The spline through exact joint positions `nodes(s)`, doubled until the tip stays on its curve between them."""
+    """Return a spline through exact joint positions `nodes(s)`.
+
+    The number of nodes is doubled until the tip stays on its curve between them.
+    """
     from scipy.interpolate import make_interp_spline
 
-    for count in _NODES:
+    fewest = int(np.clip(curve.length / tolerance, _FEWEST, _NODES[0]))
+    for count in (fewest, *_NODES[fewest == _NODES[0] :]):
         s = np.linspace(0.0, 1.0, count + 1)
         spline = make_interp_spline(s, nodes(s), k=5)
         fine = np.linspace(0.0, 1.0, count * _CHECKS_PER_NODE + 1)
@@ -115,15 +134,15 @@ def _fitted(
         if deviation <= tolerance and boom.limits.contain(q).all():
             return TipPath(curve, pitch, spline, deviation)
     raise InfeasibleError(
-        f"no smooth joint path keeps the tip within {tolerance * 1e3:g} mm of its line under constraint {constraint}: "
-        f"{_NODES[-1]} nodes leave {deviation * 1e3:.3g} mm"
+        f"no smooth joint path keeps the tip within {tolerance * 1e3:g} mm of its curve under constraint {constraint}: "
+        f"with {_NODES[-1]} nodes it deviates by {deviation * 1e3:.3g} mm"
     )
 
 
 def _through_family(
     boom: Boom, curve: TipCurve, pitch: float, constraint: ChoosingConstraint, start: Array, tolerance: float
 ) -> TipPath:
-    """The path of a constraint that chooses, resolved for the whole curve (`redundancy`)."""
+    """Return the path of a choosing constraint, resolved for the whole curve (`redundancy`)."""
     planned = _inset(boom)
     points = curve(np.linspace(0.0, 1.0, NODES))
     begins = forward_kinematics(boom, start)
@@ -136,7 +155,10 @@ def _through_family(
 
 
 def _no_curve(boom: Boom, planned: Boom, curve: TipCurve, pitch: float, constraint: ChoosingConstraint) -> str:
-    """Why no joint path within the limits follows a curve: it leaves the workspace, or no branch leads from end to end."""
+    """Explain why no joint path within the limits follows a curve.
+
+    The curve leaves the workspace, or no single branch leads from end to end.
+    """
     s = np.linspace(0.0, 1.0, NODES)
     any_member = LeastExtension()
     for within in (boom, planned):
@@ -149,17 +171,23 @@ def _no_curve(boom: Boom, planned: Boom, curve: TipCurve, pitch: float, constrai
 
 
 def _flip(constraint: Constraint, s: float, at: str) -> str:
-    return f"the tip's line forces a flip to another branch under constraint {constraint} at {s:.1%}, ({at}) m"
+    return f"the tip's path forces a change of branch under constraint {constraint} at {s:.1%}, ({at}) m"
 
 
 def _inset(boom: Boom) -> Boom:
-    """The boom with its position limits drawn in: where a choice leaves a limit that it kept to, its spline overshoots."""
+    """Return the boom with slightly narrower position limits.
+
+    A spline overshoots a little where the constraint's choice leaves a limit that it followed.
+    """
     lower, upper = boom.limits.lower + _INSET, boom.limits.upper - _INSET
     return replace(boom, limits=replace(boom.limits, lower=lower, upper=upper, linkage=boom.limits.linkage + 2.0 * _INSET[2]))
 
 
 def _one_branch(boom: Boom, curve: TipCurve, pitch: float, constraint: Constraint, s: Array, start: Array) -> Array:
-    """q (n, 5) at s (n,), each on the branch nearest to the one before: of all starts that go through, the nearest."""
+    """Return joint positions (n, 5) at s (n,), each on the branch nearest to the previous one.
+
+    Of all starting branches that reach the end, the one nearest to `start` is taken.
+    """
     found = solve_branches(boom, curve(s), pitch, constraint)
     reached = np.asarray(found.within_limits.any(axis=-1))
     if not reached.all():
@@ -180,20 +208,19 @@ def _one_branch(boom: Boom, curve: TipCurve, pitch: float, constraint: Constrain
         else:
             return path
     at = ", ".join(f"{x:.4g}" for x in curve(s[broken]))
-    raise InfeasibleError(
-        f"the tip's line forces a flip to another branch under constraint {constraint} at {s[broken]:.1%}, ({at}) m"
-    )
+    raise InfeasibleError(_flip(constraint, s[broken], at))
 
 
 def _leaves(boom: Boom, curve: TipCurve, pitch: float, constraint: Constraint, s: Array, reached: Mask) -> str:
-    """Where a curve leaves the reach, by bisection beside its first node out of reach."""
+    """Say where a curve leaves the workspace, by bisection next to its first node out of reach."""
     out = int(np.argmin(reached))
     if out == 0:
-        return f"the tip's line starts out of reach: {unreachable(boom, curve(s[0]), pitch, constraint)}"
-    inside, outside = float(s[out - 1]), float(s[out])
-    for _ in range(_BISECTIONS):
-        middle = (inside + outside) / 2.0
-        within = solve_branches(boom, curve(np.array(middle)), pitch, constraint).within_limits.any()
-        inside, outside = (middle, outside) if within else (inside, middle)
+        return f"the tip's path starts out of reach: {unreachable(boom, curve(s[0]), pitch, constraint)}"
+
+    def within(place: float) -> bool:
+        return bool(solve_branches(boom, curve(np.array(place)), pitch, constraint).within_limits.any())
+
+    inside = bisect(within, float(s[out - 1]), float(s[out]), steps=_BISECTIONS)
     at = ", ".join(f"{x:.6g}" for x in curve(np.array(inside)))
-    return f"the tip's line leaves the reach at {inside:.2%}, ({at}) m: {unreachable(boom, curve(s[out]), pitch, constraint)}"
+    why = unreachable(boom, curve(s[out]), pitch, constraint)
+    return f"the tip's path leaves the workspace at {inside:.2%}, ({at}) m: {why}"

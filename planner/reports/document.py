@@ -28,7 +28,7 @@ FORMS = (".md", ".html", ".pdf")
 _TEXT = 8  # [pt]
 _PADDING = 0.6  # [mm]
 _WITH_HEADING = 25.0  # [mm], least space below a heading on its page
-_LIBRARIES = ("numpy", "scipy", "toppra", "ruckig")
+_LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "control")
 _STYLE = (
     "body{font-family:sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;font-size:.85em}td,th{border:1px solid #bbb;padding:.25em .5em;text-align:left}"
@@ -87,13 +87,22 @@ def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figu
             content = f"{markdown.rstrip()}\n"
             for k, (title, png) in enumerate(drawn.items(), start=1):
                 beside = place.with_name(f"{path.stem}-{k}.png")  # moves along
-                beside.write_bytes(png)
+                _write(beside, png)
                 content += f"\n## {title}\n\n![{title}]({beside.name})\n"
-            place.write_text(f"{content}\n---\n\n{made}\n", encoding="utf-8", errors="backslashreplace")
+            _write(place, _encoded(f"{content}\n---\n\n{made}\n"))
         elif path.suffix == ".html":
-            place.write_text(_html(path.stem, markdown, drawn, made), encoding="utf-8", errors="backslashreplace")
+            _write(place, _encoded(_html(path.stem, markdown, drawn, made)))
         else:
-            place.write_bytes(_pdf(markdown, drawn, made))
+            _write(place, _pdf(markdown, drawn, made))
+
+
+def _write(place: Path, data: bytes) -> None:
+    with replacing(place) as temporary:
+        Path(temporary).write_bytes(data)
+
+
+def _encoded(text: str) -> bytes:
+    return text.encode(errors="backslashreplace")  # a file's name may hold any byte
 
 
 def _versions() -> list[str]:

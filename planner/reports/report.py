@@ -1,4 +1,4 @@
-"""A motion's report: its rows, what was assumed, and the verdict."""
+"""Report of a motion: rows, assumptions and verdict."""
 
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TorquePeak:
-    """The largest torque of a joint and its parts, in Nm (N for the extension); the parts add up to the total."""
+    """Largest torque of a joint and its parts, in Nm (N for the extension).
+
+    The parts add up to the total.
+    """
 
     joint: str
     unit: str
@@ -36,11 +39,11 @@ class TorquePeak:
 
 
 def torque_peaks(at: Array, parts: Breakdown) -> tuple[TorquePeak, ...]:
-    """The largest torque of each joint, in parts.
+    """Return the largest torque of each joint and its parts.
 
     Args:
-        at: (5,) time of each joint's peak.
-        parts: (5, 5) at those times; the diagonal is each joint's own.
+        at: (5,) time of each joint's largest torque [s].
+        parts: (5, 5) parts of the torques of all joints at those times.
     """
     total = parts.total
     peaks = []
@@ -52,38 +55,38 @@ def torque_peaks(at: Array, parts: Breakdown) -> tuple[TorquePeak, ...]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Report:
-    """What was checked, and what came of it."""
+    """Checks of a motion and their results."""
 
     profile: str
     duration: float
-    """[s]"""
+    """Duration [s]."""
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
-    """What a reader must know of the motion or its data."""
+    """Remarks on the motion or its data."""
     assumptions: tuple[str, ...]
-    """Every assumed figure of the boom that the checks or the planner use."""
+    """Assumed figures of the boom that the checks or the planner use."""
     peaks: tuple[TorquePeak, ...] = ()
-    """Where each joint's largest torque comes from."""
+    """Largest torque of each joint and its parts."""
     certificate: Certificate | None = None
-    """Of a planned motion: the worst ratio to each limit, recomputed; None of a recorded one."""
+    """Recomputed worst ratio to each limit of a planned motion; None for a recorded one."""
     stop: WorstStop | None = None
-    """Of a planned motion: the longest and the farthest stop on its way."""
+    """Longest and farthest stop on the way of a planned motion; None if not computed."""
     suggestions: tuple[str, ...] = ()
-    """Single changes that would make a failing motion possible, as far as they were looked for."""
+    """Single changes that make a failing motion possible; empty if none were searched."""
 
     @property
     def verdict(self) -> Verdict:
-        """FAIL where a row fails or the certificate finds a limit broken, else that of the rows."""
+        """FAIL if the certificate finds a limit exceeded, else the verdict of the rows."""
         return Verdict.FAIL if self.certificate is not None and self.certificate.broken else overall(self.rows)
 
     def verdict_of(self, joint: str) -> Verdict:
-        """The verdict of one joint's rows and of the certificate's limits on it."""
+        """Return the verdict of one joint, from its rows and its ratios in the certificate."""
         broken = self.certificate is not None and any(worst.joint == joint for worst in self.certificate.broken)
         return Verdict.FAIL if broken else overall(row for row in self.rows if row.joint == joint)
 
     @property
     def summary(self) -> str:
-        """The verdict in a sentence, with what decides it."""
+        """Verdict in a sentence, with the checks that decide it."""
         failed = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.FAIL]
         unknown = list(dict.fromkeys(r.joint for r in self.rows if r.verdict is Verdict.NOT_CHECKABLE))
         warned = [f"{r.joint} {r.check}" for r in self.rows if r.verdict is Verdict.WARN]
@@ -91,25 +94,28 @@ class Report:
             failed += [f"{worst.joint} {worst.limit} (certificate)" for worst in self.certificate.broken]
         parts = [f"failed: {', '.join(failed)}"] if failed else []
         parts += [f"passed only on estimated or assumed data: {', '.join(warned)}"] if warned else []
-        parts += [f"not checkable for want of data: {', '.join(unknown)}"] if unknown else []
+        parts += [f"not checkable because data is missing: {', '.join(unknown)}"] if unknown else []
         return f"{self.verdict}: {'; '.join(parts) if parts else 'every check passed'}"
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What certificate and stop say, for people."""
-        said = []
+        """Certificate and worst stop, in a sentence each."""
+        sentences = []
         if self.certificate is not None:
-            of, more = self.certificate, f"one more could add {self.certificate.residual:.0e} of a limit"
-            said.append(f"Certificate: recomputed at {of.samples} points; {of.iterations} solve(s), {more}")
-        if self.stop is not None:
-            said.append(
-                f"Stopping: at worst {self.stop.time_s:.2f} s ({self.stop.time_way}, begun at {self.stop.time_at_s:.2f} s) and "
-                f"{self.stop.distance_m:.2f} m of the tip ({self.stop.distance_way}, begun at {self.stop.distance_at_s:.2f} s)"
+            certificate = self.certificate
+            sentences.append(
+                f"Certificate: recomputed at {certificate.samples} points; {certificate.iterations} solve(s), "
+                f"one more could change a ratio by {certificate.residual:.0e}"
             )
-        return tuple(said)
+        if self.stop is not None:
+            sentences.append(
+                f"Stopping: at worst {self.stop.time_s:.2f} s ({self.stop.time_way}, from {self.stop.time_at_s:.2f} s) and "
+                f"{self.stop.distance_m:.2f} m of the tip ({self.stop.distance_way}, from {self.stop.distance_at_s:.2f} s)"
+            )
+        return tuple(sentences)
 
     def to_json(self, files: dict[str, str]) -> dict[str, Any]:
-        """The JSON object of `boom plan` and `boom check`, in SI."""
+        """Return the JSON object of `boom plan` and `boom check`, in SI."""
         return {
             "profile": self.profile,
             "duration_s": self.duration,
@@ -125,7 +131,7 @@ class Report:
         }
 
     def to_table(self) -> "pa.Table":
-        """The rows as a table in SI, with the columns of the JSON's checks."""
+        """Return the rows as a table in SI, with the columns of the JSON's checks."""
         import pyarrow as pa
 
         texts, numbers = ("joint", "check", "unit", "verdict", "basis", "source"), ("demand", "limit", "margin")
@@ -137,7 +143,7 @@ class Report:
         return f"Report({self.profile}, {self.duration:.3f} s, {len(self.rows)} rows, {self.verdict})"
 
     def to_markdown(self) -> str:
-        """The report as Markdown, in people's units."""
+        """Return the report as Markdown, in displayed units."""
         header = ("joint", "check", "demand", "limit", "margin", "required", "at", "verdict", "basis", "source")
         lines = [f"# {self.summary}", "", f"{self.profile}, {self.duration:.3f} s", ""]
         lines += table(header, [(*cells(row), row.source) for row in self.rows])
@@ -146,20 +152,20 @@ class Report:
         if self.certificate is not None:
             lines += ["", "## Certificate", "", *table(CERTIFICATE_HEADER, map(worst_cells, self.certificate.worst))]
         lines += [f"\n{sentence}" for sentence in self.sentences]
-        for title, texts in (("Would mend it", self.suggestions), ("Notes", self.notes), ("Assumed", self.assumptions)):
+        for title, texts in (("Possible fixes", self.suggestions), ("Notes", self.notes), ("Assumed", self.assumptions)):
             lines += section(title, texts)
         return "\n".join(lines) + "\n"
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """A row for people: joint, check, demand, limit, margin, required margin, time, verdict, basis."""
+    """Return a row as text in displayed units, in the columns of ROW_HEADER."""
     factor, unit = row.shown_unit.per_si, row.shown_unit.name
     if row.margin is None:
         margin = "-"
     elif row.kind.margin is Margin.DISTANCE:
         margin = f"{row.margin * factor:.4g} {unit}"
     else:
-        margin = f"{round(row.margin, 2) + 0.0:.0%}"  # no -0%
+        margin = f"{round(row.margin, 2) + 0.0:.0%}"  # turns -0% into 0%
     return (
         row.joint,
         row.check,
@@ -174,7 +180,7 @@ def cells(row: Row) -> tuple[str, ...]:
 
 
 def _rounded(value: float) -> str:
-    """Four digits, and no power of ten below a million million."""
+    """Return four significant digits, without an exponent below 1e12."""
     return f"{float(f'{value:.4g}'):.12g}"
 
 
@@ -184,7 +190,7 @@ CERTIFICATE_HEADER = ("limit", "joint", "worst ratio", "at")
 
 
 def worst_cells(worst: WorstRatio) -> tuple[str, ...]:
-    """A certificate's worst ratio for people, under CERTIFICATE_HEADER."""
+    """Return a worst ratio as text, in the columns of CERTIFICATE_HEADER."""
     return (worst.limit, worst.joint, f"{worst.ratio:.4f}", "-" if worst.at_s is None else f"{worst.at_s:.2f} s")
 
 
@@ -192,13 +198,18 @@ PEAK_HEADER = ("joint", "at", "total", "gravity", "inertia", "velocity", "payloa
 
 
 def peak_cells(peak: TorquePeak) -> tuple[str, ...]:
-    """A torque peak for people, under PEAK_HEADER."""
+    """Return a torque peak as text, in the columns of PEAK_HEADER."""
     parts = (peak.gravity, peak.inertia, peak.velocity, peak.payload, peak.friction, peak.vehicle)
     return (peak.joint, f"{peak.at_s:.2f} s", f"{peak.total:.2f} {peak.unit}", *(f"{part:.2f}" for part in parts))
 
 
 def assumptions(boom: Boom, jerk_limited: bool) -> tuple[str, ...]:
-    """Every assumed figure of a boom, a sentence each; the jerk limits only where a motion was planned with them."""
+    """Return a sentence for every assumed figure of a boom.
+
+    Args:
+        boom: the boom.
+        jerk_limited: whether to include the jerk limits, which not every motion uses.
+    """
     limits = boom.limits
     sentences = []
     for power, name in enumerate(("velocity", "acceleration", "jerk"), start=1):
@@ -228,19 +239,17 @@ def assumptions(boom: Boom, jerk_limited: bool) -> tuple[str, ...]:
             sentences.append(f"{JOINTS[i]} position limits: {origin.source}")
     if limits.origins["linkage"][0].basis is Basis.ASSUMED:
         sentences.append(f"coupled limit of the linkage: {limits.origins['linkage'][0].source}")
-    for name, bearable in (("force", boom.mount.force), ("moment", boom.mount.moment)):
+    for name, bearable, unit in (("force", boom.mount.force, "N"), ("moment", boom.mount.moment, "Nm")):
         if bearable is not None and bearable.origin.basis is Basis.ASSUMED:
-            sentences.append(f"{name} that the mount bears, {bearable.value:g}: {bearable.origin.source}")
+            sentences.append(f"largest {name} on the mount {bearable.value:g} {unit}: {bearable.origin.source}")
     keep = boom.keep_out
     if keep is not None:
         if keep.origin.basis is Basis.ASSUMED:
-            lengths = (
-                f"clearance {keep.clearance:g} m, radius of links {keep.link_radius:g} m, of payload {keep.payload_radius:g} m"
-            )
-            sentences.append(f"{lengths}: {keep.origin.source}")
+            radii = f"radius of links {keep.link_radius:g} m and of payload {keep.payload_radius:g} m"
+            sentences.append(f"clearance {keep.clearance:g} m, {radii}: {keep.origin.source}")
         assumed = [shape for shape in keep.shapes if shape.origin.basis is Basis.ASSUMED]
-        sentences += [f"{shape.name} to keep away from: {shape.origin.source}" for shape in assumed]
+        sentences += [f"keep-out shape {shape.name}: {shape.origin.source}" for shape in assumed]
     if limits.origins["transmission"][0].basis is Basis.ASSUMED:
         angle = np.degrees(limits.transmission)
-        sentences.append(f"transmission angle warned of below {angle:g} deg: {limits.origins['transmission'][0].source}")
+        sentences.append(f"guideline for the transmission angle {angle:g} deg: {limits.origins['transmission'][0].source}")
     return tuple(sentences)

@@ -166,10 +166,7 @@ def sizing_notes(
     """
     absent = dict.fromkeys(choice.joint for choice in choices if choice.fitted is None and choice.judged)
     by_joint = [f"{', '.join(absent)}: no drive is fitted; the mass of a new one is not added to any body"] if absent else []
-    empty = dict.fromkeys(choice.joint for choice in choices if not choice.judged and not choice.unmet)
-    by_joint += [f"{', '.join(empty)}: NOT CHECKED, the catalogue has no drive for it"] if empty else []
-    none_left = dict.fromkeys(choice.joint for choice in choices if not choice.judged and choice.unmet)
-    by_joint += [f"{', '.join(none_left)}: NOT CHECKED, no drive of the catalogue is left to try"] if none_left else []
+    by_joint += [f"{joints}: NOT CHECKED, {reason}" for joints, reason in not_checked(choices)]
     by_joint += dict.fromkeys(
         _infeasible_note(choice) for choice in choices if choice.fitted is not None and choice.fitted.infeasible
     )
@@ -186,6 +183,14 @@ def sizing_notes(
     ]
     notes += [f"no drive has the data for these checks, so none can PASS: {unknown}"] if unknown else []
     return (*notes, *left_out, *by_joint)
+
+
+def not_checked(choices: Sequence[Choice]) -> list[tuple[str, str]]:
+    """Return the joints for which no drive was tried, each time with the reason."""
+    empty = dict.fromkeys(choice.joint for choice in choices if not choice.judged and not choice.unmet)
+    none_left = dict.fromkeys(choice.joint for choice in choices if not choice.judged and choice.unmet)
+    reasons = ((empty, "the catalogue has no drive for it"), (none_left, "no drive of the catalogue is left to try"))
+    return [(", ".join(joints), reason) for joints, reason in reasons if joints]
 
 
 def _infeasible_note(choice: Choice) -> str:

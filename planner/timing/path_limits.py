@@ -12,23 +12,22 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from boom_model import JOINTS, Boom, InfeasibleError, breakdown, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
-from boom_model.drives.drive import drive_inertia, motor_limit
+from boom_model.drives.limits import gear_limits, motor_limits, rotors, static_limits
 from boom_model.dynamics.base_motion import BaseMotion
 from planner.paths.path import JointLine, Path
 from planner.timing.roots import just_kept
 from planner.timing.time_law import Motion, TimeLaw
 
 if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
+    from scipy.interpolate import BSpline
 
 _FINITE = 1e12
 _LEAST_SHARE = 1e-6
-_SLOPES = 20_000
+_SLOPES = 20_001
 _BETWEEN = 20
 _ROUNDING = 1e-9
 _LOAD_INTERVALS = 500
@@ -97,11 +96,6 @@ class PathDynamics:
         return held
 
 
-def rotors(boom: Boom) -> Array:
-    """(5,) what the drives' own inertia adds to the motors' share, eta N^2 (J_rotor + J_gear) [kg m^2]."""
-    return np.array([drive_inertia(drive) if drive else 0.0 for drive in boom.drives])
-
-
 def gear_ratio(boom: Boom, tau: Array) -> Array:
     """Joint torques (..., 5) over the gearboxes' start-stop torque; 0 where none is given."""
     ratio: Array = np.abs(tau) / gear_limits(boom)
@@ -120,31 +114,9 @@ def load_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array) -> Array:
     return np.maximum(gear_ratio(boom, tau), motor_ratio(boom, tau, qd, qdd))
 
 
-def gear_limits(boom: Boom) -> Array:
-    """(5,) start-stop torque of the gearboxes [Nm]; infinite where none is given."""
-    limits = [None if drive is None else drive.gearbox.start_stop_torque for drive in boom.drives]
-    return np.array([np.inf if limit is None else limit for limit in limits])
-
-
-def motor_limits(boom: Boom, speed: ArrayLike) -> Array:
-    """`motor_limit` of every joint at joint speeds (..., 5), likewise shaped; infinite where no motor limits."""
-    speed = np.asarray(speed, dtype=float)
-    limits = np.full_like(speed, np.inf)
-    for i, drive in enumerate(boom.drives):
-        limit = None if drive is None else motor_limit(drive, speed[..., i])
-        if limit is not None:
-            limits[..., i] = limit
-    return limits
-
-
 def limited_by_drives(boom: Boom) -> bool:
     """Whether any gearbox or motor limits a torque."""
     return bool(np.isfinite(static_limits(boom)).any())
-
-
-def static_limits(boom: Boom) -> Array:
-    """(5,) torque that motor and gearbox allow at rest [Nm]; infinite where no drive limits."""
-    return np.minimum(gear_limits(boom), motor_limits(boom, np.zeros(5)))
 
 
 def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = None) -> PathDynamics:
@@ -199,29 +171,32 @@ def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None 
 
 @dataclass(frozen=True, eq=False)
 class PathLoads:
-    """A path's torques a u + b x + c, interpolated along it: for a search that asks for them many times."""
+    """A path's torques a u + b x + c, interpolated along it: for a search that asks for them many times.
+
+    Linearly: beside a waypoint they can jump, and anything smoother overshoots there.
+    """
 
     boom: Boom
     path: Path
-    torques: "CubicSpline"
+    torques: "BSpline"
     """s to (3, 5): a, b and c"""
 
     @staticmethod
     def along(boom: Boom, path: Path, base: BaseMotion | None = None) -> "PathLoads":
         """The loads of a path on a base that is tilted at most."""
-        from scipy.interpolate import CubicSpline
+        from scipy.interpolate import make_interp_spline
 
         s = spread(path, _LOAD_INTERVALS)
         demands = path_dynamics(boom, path, s, base)
-        return PathLoads(boom, path, CubicSpline(s, np.stack([demands.a, demands.b, demands.c], axis=1)))
+        return PathLoads(boom, path, make_interp_spline(s, np.stack([demands.a, demands.b, demands.c], axis=1), k=1))
 
-    def least_stretch(self, law: TimeLaw, t: Array) -> float:
-        """As the function `least_stretch`, at times t (n,) of a law."""
+    def stretch(self, law: TimeLaw, t: Array, floor: float) -> float:
+        """The least factor from `floor` on by which a law must be slowed to keep the limits at times t (n,)."""
         s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
         s, v, u = np.clip(s, 0.0, 1.0), v[:, None], u[:, None]
         p1 = self.path(s, 1)
         qd, qdd = p1 * v, p1 * u + self.path(s, 2) * v**2
-        least = _joint_stretch(self.boom, qd, qdd)
+        least = max(floor, _joint_stretch(self.boom, qd, qdd))
         if not limited_by_drives(self.boom):
             return least
         a, b, c = np.moveaxis(self.torques(s), 1, 0)
@@ -307,7 +282,8 @@ def path_limits(boom: Boom, path: Path) -> tuple[float, float, float]:
 
     On a straight path they bound the first, second and third time derivative of s.
     """
-    step = np.abs(path(spread(path, 1 if isinstance(path, JointLine) else _SLOPES), 1)).max(axis=0)
+    points = np.linspace(0.0, 1.0, 1 if isinstance(path, JointLine) else _SLOPES)
+    step = np.abs(path(points, 1)).max(axis=0)
     limits = boom.limits
     with np.errstate(divide="ignore"):
         velocity, acceleration, jerk = (

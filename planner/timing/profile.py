@@ -1,6 +1,7 @@
-"""The profiles: how each one times a path, with the options that it alone has.
+"""Timing profiles, each with its own options.
 
-To add a profile, write its law in a file of `profiles/`, give it a class here, and add that to PROFILES.
+To add a profile, write its law in a file of `profiles/`, write a class for it here, and add the
+class to PROFILES.
 """
 
 from abc import ABC, abstractmethod
@@ -20,7 +21,7 @@ from planner.timing.time_law import Motion, TimeLaw
 
 
 class Profile(StrEnum):
-    """The word for each profile."""
+    """Words for the profiles."""
 
     CUBIC = "cubic"
     QUINTIC = "quintic"
@@ -31,20 +32,23 @@ class Profile(StrEnum):
 
 @dataclass(frozen=True)
 class TimingProfile(ABC):
-    """How a path is timed. Each law's library is imported where it is used: they are slow to import."""
+    """Way of timing a path.
+
+    A law's library is imported where it is used, because these libraries are slow to import.
+    """
 
     name: ClassVar[Profile]
 
     @abstractmethod
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
-        """The time law along a path on a base that is tilted at most.
+        """Return the time law along a path. `base` may be tilted, but must not move.
 
         Raises:
-            InfeasibleError: no law keeps the limits.
+            InfeasibleError: no law respects the limits.
         """
 
     def motion(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> Motion:
-        """The motion along a path, in the least time of this profile.
+        """Return the motion along a path in the shortest time of this profile.
 
         Raises:
             InfeasibleError: as `law`.
@@ -52,18 +56,13 @@ class TimingProfile(ABC):
         return Motion(path, self.law(boom, path, base))
 
     @property
-    def limits_jerk(self) -> bool:
-        """Whether the joints' jerk limits are kept."""
-        return False
-
-    @property
     def limits_average_torque(self) -> bool:
-        """Whether the gearboxes' average torque is kept."""
+        """Whether the profile respects the gearboxes' average torque limit."""
         return False
 
     @property
     def exact_on_lines(self) -> bool:
-        """Whether the law keeps every limit along a straight joint path, between the points that it looked at as well."""
+        """Whether the law respects every limit between its grid points on a straight joint path."""
         return True
 
     def __str__(self) -> str:
@@ -72,33 +71,43 @@ class TimingProfile(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Cubic(TimingProfile):
-    """Cubic polynomial in time from rest to rest; a cubic spline through waypoints that are passed without a stop."""
+    """Cubic polynomial in time from rest to rest.
+
+    Through waypoints without a stop it is a cubic spline.
+    """
 
     name = Profile.CUBIC
     velocities: Array | None = None
-    """(k, 5) joint velocities at the k waypoints [rad/s, the extension's m/s]; None makes the acceleration continuous."""
+    """(k, 5) joint velocities at the k waypoints [rad/s, m/s for the extension]. None makes the
+    acceleration continuous."""
 
     @staticmethod
     def with_velocities(velocities: ArrayLike) -> "Cubic":
-        """The cubic with given velocities at its waypoints.
+        """Return the cubic with given velocities at its waypoints.
 
         Raises:
-            InputError: not finite, or not (k, 5).
+            InputError: the velocities are not finite or not (k, 5).
         """
         return Cubic(read_only(checked("via_velocities", velocities, 5)))
 
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        """Return the time law along a path; see `TimingProfile.law`."""
         from planner.timing.profiles.cubic import cubic
 
         return cubic(boom, path, base)
 
     def motion(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> Motion:
+        """Return the motion along a path; see `TimingProfile.motion`.
+
+        Through waypoints, the cubics have a path of their own, which must keep its clearance as
+        well.
+        """
         if not isinstance(path, SplinePath):
             return super().motion(boom, path, base)
         from planner.timing.profiles.cubic_through import cubic_through
 
         motion = cubic_through(boom, path.waypoints, base)
-        require_path_clear(boom, motion.path)  # another path than the one that was looked at
+        require_path_clear(boom, motion.path)  # it differs from the path that was checked before
         return motion
 
 
@@ -109,6 +118,7 @@ class Quintic(TimingProfile):
     name = Profile.QUINTIC
 
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        """Return the time law along a path; see `TimingProfile.law`."""
         from planner.timing.profiles.quintic import quintic
 
         return quintic(boom, path, base)
@@ -121,6 +131,7 @@ class Trapezoidal(TimingProfile):
     name = Profile.TRAPEZOIDAL
 
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        """Return the time law along a path; see `TimingProfile.law`."""
         from planner.timing.profiles.trapezoidal import trapezoidal
 
         return trapezoidal(boom, path, base)
@@ -128,21 +139,19 @@ class Trapezoidal(TimingProfile):
 
 @dataclass(frozen=True)
 class JerkLimited(TimingProfile):
-    """Shortest motion within even limits on speed, acceleration and jerk along the path."""
+    """Shortest motion within constant limits on speed, acceleration and jerk along the path."""
 
     name = Profile.JERK_LIMITED
 
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        """Return the time law along a path; see `TimingProfile.law`."""
         from planner.timing.profiles.jerk_limited import jerk_limited
 
         return jerk_limited(boom, path, base)
 
     @property
-    def limits_jerk(self) -> bool:
-        return True
-
-    @property
     def exact_on_lines(self) -> bool:
+        """Whether the law respects every limit between its grid points on a straight joint path."""
         return False
 
 
@@ -152,11 +161,12 @@ class TimeOptimal(TimingProfile):
 
     name = Profile.TIME_OPTIMAL
     jerk_bound: bool = False
-    """Keep the jerk limits as well, with no acceleration at the ends."""
+    """Respect the jerk limits as well, with zero acceleration at both ends."""
     average_torque: bool = False
-    """Keep the gearboxes' average torque as well."""
+    """Respect the gearboxes' average torque limit as well."""
 
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        """Return the time law along a path; see `TimingProfile.law`."""
         from planner.timing.profiles.average_torque import within_average_torque
         from planner.timing.profiles.jerk_bound import jerk_bounded, with_jerk_bound
         from planner.timing.profiles.jerk_limited import evenly_limited
@@ -171,15 +181,13 @@ class TimeOptimal(TimingProfile):
         return min(laws, key=lambda each: each.duration)
 
     @property
-    def limits_jerk(self) -> bool:
-        return self.jerk_bound
-
-    @property
     def limits_average_torque(self) -> bool:
+        """Whether the profile respects the gearboxes' average torque limit."""
         return self.average_torque
 
     @property
     def exact_on_lines(self) -> bool:
+        """Whether the law respects every limit between its grid points on a straight joint path."""
         return False
 
 
@@ -192,10 +200,11 @@ PROFILES: Mapping[str, type[TimingProfile]] = MappingProxyType(
 def parse_profile(
     word: str, *, jerk_bound: bool = False, average_torque: bool = False, velocities: ArrayLike | None = None
 ) -> TimingProfile:
-    """A profile from its word and the options that the command and mission files give beside it.
+    """Return the profile for a word and the options given with it.
 
     Raises:
-        InputError: no such profile, an option of another profile, or velocities that are not finite or not (k, 5).
+        InputError: the profile is unknown, an option belongs to another profile, or the velocities
+            are not finite or not (k, 5).
     """
     kind = PROFILES.get(word)
     if kind is None:

@@ -20,7 +20,7 @@ import numpy as np
 from boom_model import Boom
 from planner import Trajectory
 from planner.motion.motion_files import read_motion, write_motion
-from planner.planning import examine
+from planner.planning import check_motion
 from planner.recording import write_recording
 
 count, boom = int(sys.argv[1]), Boom.load()
@@ -46,7 +46,7 @@ def run(n, seconds):
     made = motion(n)
     timed("write CSV", lambda: write_motion(made, "m.csv"))
     read = timed("read CSV", lambda: read_motion("m.csv"))
-    move = timed("check", lambda: examine(boom, read))
+    move = timed("check", lambda: check_motion(boom, read))
     for name in ("m.parquet", "m.yaml", "m.json"):
         timed(f"write {name}", lambda: write_motion(read, name, move.loads.tau))
     timed("read Parquet", lambda: read_motion("m.parquet"))

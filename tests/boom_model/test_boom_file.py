@@ -451,7 +451,7 @@ def test_a_users_catalogue_adds_to_the_shipped_one(edited, own_catalogue):
 def test_a_name_that_is_taken_is_refused(own_catalogue):
     own_catalogue.write_text(MINE.replace("motors.MINE", "motors.MST340B02"))
     message = refusal(lambda: Boom.load(catalogue=own_catalogue))
-    assert message == f"{own_catalogue}: key motors.MST340B02: the name is taken by an entry that is known already"
+    assert message == f"{own_catalogue}: key motors.MST340B02: the catalogue already has an entry of this name"
 
 
 def test_a_users_actuator_drives_the_extension(edited, own_catalogue):

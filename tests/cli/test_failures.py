@@ -16,9 +16,9 @@ from pyarrow import parquet
 
 from boom_model import Boom
 from boom_model.boom_file import BOOM_FILE
-from planner import cli, plan, write_csv
+from planner import cli, plan
 from planner.cli.failures import failure
-from planner.motion.trajectory import COLUMNS
+from planner.motion.trajectory import COLUMNS, write_csv
 
 COMMAND = [sys.executable, "-c", "from planner.__main__ import main; main()"]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
@@ -203,7 +203,7 @@ def test_a_toml_file_beyond_reason(boom, tmp_path, text, said):
         (("plan", "transport", "tip=1e308,0,1"), "tip=1e308,0,1 is 1e+308"),
         ((*LINE, "--along", "arc=1e308,0,1"), "arc=1e308,0,1 is 1e+308"),
         ((*PLAN, "--pitch", "1e308"), "pitch is 1e+308"),
-        ((*PLAN, "--hold", "extension=1e308"), "hold extension is 1e+308"),
+        ((*PLAN, "--constraint", "extension=1e308"), "constraint extension is 1e+308"),
         (("link", "--load", "thesis", "--deflection", "1e-300"), "deflection is 1e-300 m; it must be between 1e-06 and 10 m"),
         (("link", "--load", "thesis", "--method", "thesis", "--step", "1e-300"), "step is 1e-300 m"),
         (("link", "--load", "thesis", "--safety-factor", "1e308"), "safety factor is 1e+308"),

@@ -266,7 +266,7 @@ def test_the_elastic_linearisation_equals_differences_of_the_nonlinear_plant():
     ("values", "message"),
     [
         ({"rate_Hz": 1e9}, "rate_Hz is 1e\\+09; it must be from 50 to 20000"),
-        ({"damping": 0.1}, "unknown figure 'damping'; there are: rate_Hz, encoder_counts"),
+        ({"damping": 0.1}, "unknown figure 'damping'; the figures are: rate_Hz, encoder_counts"),
         ({"rate_Hz": 0.0}, "rate_Hz is 0; it must be above 0"),
         ({"structural_damping": -0.1}, "structural_damping is -0.1; it must be at least 0"),
         ({"microsteps": np.nan}, "microsteps is nan"),
@@ -283,14 +283,14 @@ def test_figures_are_assumed_until_given():
     assert (figures.structural_damping, figures.rate_Hz) == (0.01, 500.0)
     assert not any(line.startswith(("structural_damping", "rate_Hz")) for line in figures.assumptions)
     assert any(line.startswith("encoder_counts 4000: ") for line in figures.assumptions)
-    with pytest.raises(InputError, match="'rate_Hz' is no NAME=VALUE"):
+    with pytest.raises(InputError, match="'rate_Hz' is not NAME=VALUE"):
         parse_figures(["rate_Hz"])
 
 
 def test_a_rigid_plant_says_what_it_leaves_out():
     rigid = Plant.of(BOOM, elastic=False)
     assert rigid.elastic == ()
-    assert "inner, lower: the gearbox does not twist here" in rigid.limits[1]
+    assert "inner, lower: the gearbox is simulated as rigid" in rigid.limits[1]
     assert "yaw, extension, wrist: no drive is given" in rigid.limits[0]
-    with pytest.raises(InputError, match="nothing swings"):
+    with pytest.raises(InputError, match="no natural frequencies"):
         natural_frequencies(rigid, GOAL)

@@ -309,10 +309,10 @@ def test_exports_by_the_command(boom):
         (("compare", "move.csv", "log.csv", "--offset", "soon"), "neither a number of seconds nor best"),
         (("compare", "move.csv", "none.csv"), "none.csv: cannot be read"),
         (("compare", "move.csv", "log.csv", "--out", "none/x.rrd"), "cannot be written"),
-        (("export", "move.csv", "move.mat"), "a motion is written as"),
+        (("export", "move.csv", "move.mat"), "the name of a motion's file must end in"),
         (("export", "none.csv", "move.json"), "none.csv: cannot be read"),
-        (("torque", "move.csv", "--out", "tau.txt"), "a motion is written as"),
-        (("export-model", "boom.sdf"), "a boom is written as"),
+        (("torque", "move.csv", "--out", "tau.txt"), "the name of a motion's file must end in"),
+        (("export-model", "boom.sdf"), "the name of a boom's model must end in"),
         (("check", "move.csv", "--out", "none/x.rrd"), "cannot be written"),
     ],
 )

@@ -274,6 +274,6 @@ def test_mujoco_is_not_given_a_body_without_mass():
 
 
 def test_another_ending_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match=r"written as \.urdf"):
+    with pytest.raises(InputError, match=r"must end in \.urdf"):
         write_model(BOOM, tmp_path / "boom.sdf")
     assert list(tmp_path.iterdir()) == []

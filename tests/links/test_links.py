@@ -80,7 +80,7 @@ def test_a_designed_link_is_held_by_its_own_checks(new):
     assert all(c.stress <= 175e6 for c in new.checks)
     assert new.stress_check.by_elements == pytest.approx(new.stress_check.own, rel=9e-3)
     assert new.mass < 0.6 * 3.72
-    assert new.exact.gap < 1e-5
+    assert 0.0 <= new.exact.gap <= 1e-10
     assert new.tapered_load >= 2.0 * new.pressed * (1.0 - 1e-5)
     least, most = new.saved
     assert 0.12 < least < most < 0.16
@@ -103,6 +103,10 @@ def test_every_link_can_be_designed(new, name):
 def test_assumed_material_is_said_to_be(new):
     found = design_link(BOOM, replace(new.task, material="cfrp", slices=60), new.trajectories)
     assert any(note.startswith("material cfrp (assumed)") for note in found.notes)
+
+
+def test_picture_report_and_json_share_one_convergence_study(new):
+    assert study(new) is study(new)
 
 
 def test_convergence_studies(old, new):
@@ -244,9 +248,10 @@ def test_motors_of_your_own_are_tried(boom, tmp_path):
 
 def test_a_heavier_link_is_said_to_be(boom):
     _, out, _ = boom("link", "--load", "thesis", "--min-height", "0.25", "--slices", "50")
-    assert "% more along the moves" in out
-    assert "less along" not in out
-    assert "beam theory does not hold" in out
+    told = " ".join(out.split())
+    assert "% more along the moves" in told
+    assert "less along" not in told
+    assert "beam theory does not hold" in told
 
 
 def test_no_saving_is_given_where_fittings_are_unknown(new):

@@ -64,7 +64,7 @@ def with_column(table: pa.Table, name: str, values: Any, unit: str | None = None
     ("edit", "message"),
     [
         (lambda t: with_column(t, "q2", t["q2"], "deg"), "column q2 is in deg; it must be in rad"),
-        (lambda t: with_column(t, "q2", pa.array(["x"] * len(t))), "a column is not of numbers"),
+        (lambda t: with_column(t, "q2", pa.array(["x"] * len(t))), "a column does not hold numbers"),
         (lambda t: with_column(t, "q2", pa.array([None, *t["q2"].to_pylist()[1:]], pa.float64())), "row 1, column q2: nan"),
         (lambda t: t.drop_columns(["qd3"]), "lacks the column qd3"),
         (lambda t: t.drop_columns([f"qd{i}" for i in range(1, 6)]), "lacks the column qd1, qd2, qd3, qd4, qd5"),
@@ -147,7 +147,7 @@ def test_times_that_ros_cannot_hold_are_refused(t: list[float], message: str, tm
 
 
 def test_another_ending_is_refused(tmp_path: Path):
-    with pytest.raises(InputError, match=r"written as \.csv, \.parquet"):
+    with pytest.raises(InputError, match=r"must end in one of \.csv, \.parquet"):
         write_motion(MOVE.trajectory, tmp_path / "move.txt")
 
 

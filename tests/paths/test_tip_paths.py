@@ -8,6 +8,7 @@ import pytest
 from boom_model.arrays import Array
 from boom_model.boom import Boom
 from boom_model.drives.drive import reflected_inertia
+from boom_model.drives.limits import motor_limits, rotors
 from boom_model.dynamics.newton_euler import inverse_dynamics
 from boom_model.errors import InfeasibleError, InputError
 from boom_model.kinematics.constraints import (
@@ -26,7 +27,7 @@ from planner import TipTarget, plan
 from planner.motion.trajectory import sample
 from planner.paths.tip_curves import TipArc, TipLine
 from planner.paths.tip_path import TipPath, follow
-from planner.timing.path_limits import motor_limits, path_dynamics, rotors
+from planner.timing.path_limits import path_dynamics
 from planner.timing.profile import Profile
 
 BOOM = Boom.load()
@@ -192,7 +193,7 @@ def test_no_hold_flips_where_its_own_choice_could_go_on(constraint):
 def test_a_line_that_leaves_the_reach_names_where(constraint):
     """With the actuator horizontal the extension ends the reach: r = L2 + L9 cos(theta2) + L7 + 1 m."""
     curve = line((1.4, 0.0, 1.0), (2.6, 0.0, 1.0))
-    with pytest.raises(InfeasibleError, match="the tip's line leaves the reach at") as caught:
+    with pytest.raises(InfeasibleError, match="the tip's path leaves the workspace at") as caught:
         follow(BOOM, curve, DOWN, constraint)
     percent, x, y, z = re.search(r"at ([\d.]+)%, \(([^,]+), ([^,]+), ([^)]+)\) m", str(caught.value)).groups()
     inside, outside = 0.0, 1.0
@@ -217,16 +218,14 @@ def test_a_line_that_one_branch_can_follow_from_end_to_end_is_followed():
 
 
 def test_a_line_that_starts_out_of_reach_says_so():
-    with pytest.raises(InfeasibleError, match=r"the tip's line starts out of reach: tip \(3, 0, 1\) m"):
+    with pytest.raises(InfeasibleError, match=r"the tip's path starts out of reach: tip \(3, 0, 1\) m"):
         follow(BOOM, line((3.0, 0.0, 1.0), (1.4, 0.0, 1.0)), DOWN, ActuatorHorizontal())
 
 
 @pytest.mark.parametrize("y", [0.3, -0.3])
 def test_a_line_across_the_end_of_yaw_forces_a_flip(y):
     """Of 64 equal steps the 33rd is the first beyond y = 0 from below, and the 32nd, on it, is at 0 deg from above."""
-    with pytest.raises(
-        InfeasibleError, match=r"forces a flip to another branch under constraint horizontal at 5[01]"
-    ) as caught:
+    with pytest.raises(InfeasibleError, match=r"forces a change of branch under constraint horizontal at 5[01]") as caught:
         follow(BOOM, line((1.4, y, 1.0), (1.4, -y, 1.0)), DOWN, ActuatorHorizontal())
     assert float(re.search(r"\(1.4, ([^,]+), 1\) m", str(caught.value))[1]) == pytest.approx(0.0, abs=0.6 / 64)
 
@@ -340,11 +339,11 @@ def test_a_leg_of_no_length_is_left_out():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"along": (0.0, 1.6, 1.0), "via": [VIA]}, "an arc goes from one tip target to another, with no stop on the way"),
-        ({"along": "line", "start": "transport"}, "'transport' is no tip target"),
-        ({"along": "line", "via": [(1.5, 1.0, 3.0, 0.3, 0.0)]}, "is no tip target"),
-        ({"along": "line", "pitch": None}, "at constant pitch, which must be given"),
-        ({"along": (0.0, 1.6, 1.0), "pitch": None}, "at constant pitch, which must be given"),
+        ({"along": (0.0, 1.6, 1.0), "via": [VIA]}, "an arc connects two tip targets; it takes no targets on the way"),
+        ({"along": "line", "start": "transport"}, "'transport' is not a tip target"),
+        ({"along": "line", "via": [(1.5, 1.0, 3.0, 0.3, 0.0)]}, "is not a tip target"),
+        ({"along": "line", "pitch": None}, "has a constant pitch, which must be given"),
+        ({"along": (0.0, 1.6, 1.0), "pitch": None}, "has a constant pitch, which must be given"),
         ({"along": "spiral"}, "along 'spiral' is not known; there are: joint, line, arc=X,Y,Z"),
         ({"along": (0.0, 1.4, 1.0)}, "lies on a line with start and goal"),
         ({"along": (0.0, np.nan, 1.0)}, r"via\[1\] is nan"),

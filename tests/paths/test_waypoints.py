@@ -189,7 +189,7 @@ def test_velocities_beyond_a_joints_limit_are_refused_with_segment_and_joint():
         ({"velocities": VELOCITIES * np.nan}, r"via_velocities\[0, 0\] is nan"),
         ({"velocities": VELOCITIES, "profile": "quintic"}, "for the cubic profile, not for quintic"),
         ({"velocities": VELOCITIES, "via": []}, r"with 0 waypoints, .* \(0, 5\)"),
-        ({"stop_at_via": False, "along": "line"}, "led by the joints, not by a line"),
+        ({"stop_at_via": False, "along": "line"}, "on a joint path only, not on a line"),
         ({"jerk_bound": True}, "jerk_bound is for the time-optimal profile, not for cubic"),
         ({"average_torque": True, "profile": "jerk-limited"}, "average_torque is for the time-optimal profile"),
         ({"rate": 0.0}, "rate is 0 Hz"),

@@ -22,7 +22,7 @@ from boom_model.kinematics.frames import frame_transforms
 from boom_model.provenance import Basis, Origin
 from planner import MoveSpec, cli
 from planner.motion.vehicle import load_case
-from planner.planning import Move, examine, plan
+from planner.planning import Move, check_motion, plan
 from planner.profile_table import profile_markdown, profile_moves, profile_rows
 from planner.recording import write_moves_recording, write_recording
 from planner.recording.drive_plots import margin
@@ -123,7 +123,7 @@ def ratio_by_datasheet(boom: Boom, move: Move) -> Array:
 @pytest.mark.parametrize(("planned_for", "carries", "over"), [(10.0, 10.0, False), (20.0, 20.0, False), (10.0, 20.0, True)])
 def test_colour_of_the_path_is_the_worst_drives_ratio(planned_for: float, carries: float, over: bool, tmp_path: Path):
     light = plan(BOOM.with_payload(planned_for), "transport", "phenotyping", profile="time-optimal", step=0.02)
-    heavy = examine(BOOM.with_payload(carries), light.trajectory)
+    heavy = check_motion(BOOM.with_payload(carries), light.trajectory)
     panel, ratio = read(tmp_path, heavy), ratio_by_datasheet(BOOM, heavy)
     strips = panel.static("/world/tip_path", "LineStrips3D:strips")
     colors = panel.static("/world/tip_path", "LineStrips3D:colors")
@@ -414,7 +414,7 @@ def test_reach_is_recorded_by_the_command(tmp_path: Path, monkeypatch: pytest.Mo
     assert nothing.titles()["/world"].endswith("; no point reachable with constraint extension=5 m, pitch -90 deg")
     capsys.readouterr()
     assert boom(monkeypatch, *at_rest, "--pitch", "free") == 2
-    assert capsys.readouterr().err == "boom: pitch free: the reach is drawn for one pitch\n"
+    assert capsys.readouterr().err == "boom: pitch free: the workspace is drawn for one pitch\n"
 
 
 def test_one_package_knows_rerun():

@@ -288,7 +288,7 @@ def test_on_a_slope_the_rows_are_those_of_the_mission_on_the_slope(adapt):
         )
         assert judged.rows == expected
         assert judged.rows != level[judged.supply]
-    with pytest.raises(InputError, match="vehicle case shock: a mission takes a slope alone"):
+    with pytest.raises(InputError, match="vehicle case shock: a mission can be on a slope only"):
         size(BOOM, cycle, "inner", drives, vehicle=load_case("shock"))
 
 

@@ -7,10 +7,11 @@ import pytest
 
 from boom_model import Boom, InfeasibleError, inverse_dynamics
 from boom_model.drives.drive import reflected_inertia
+from boom_model.drives.limits import motor_limits
 from planner import Cubic, TimeOptimal, plan
 from planner.motion.trajectory import sample
 from planner.paths.path import JointLine
-from planner.timing.path_limits import InfeasiblePathError, motor_limits
+from planner.timing.path_limits import InfeasiblePathError
 from planner.timing.profile import Profile
 from planner.timing.timing import Timing, timed
 

@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 
 from boom_model import BoomError, inverse_dynamics
-from planner import certify
-from planner.timing.path_limits import static_limits
+from boom_model.drives.limits import static_limits
+from planner.checks.certificate import certify
 from tests.limits import worst
 from tests.random_plans import random_plan
 
 COUNT, TOGETHER = 120, 10
 """Plans, of which 3,000 were run by hand; so many in one test."""
-BROKE_ONCE = (142, 199, 394, 424, 1366, 1546, 1774, 1987, 2092, 2296, 2539)
-"""Numbers of plans that broke a limit, by up to eleven times it, or crept: tiny lines, kinks, waypoints a micron apart."""
+BROKE_ONCE = (71, 142, 199, 394, 424, 446, 1136, 1366, 1546, 1774, 1987, 2092, 2296, 2539)
+"""Numbers of plans that broke a limit, by up to eleven times it, or crept: tiny lines, kinks, waypoints a micron apart.
+
+71, 446 and 1546 broke it under one OpenBLAS kernel more than under another.
+"""
 SLACK = 1.001
 TORQUES = ("gearbox torque", "motor torque")
 JOINT_LIMITS = ("velocity", "acceleration", "jerk")

@@ -1,1 +1,1 @@
-"""What each kind of drive is held against, and what of a motion its joint sees."""
+"""Checks of gearbox, motor, brake, linear actuator and tip deflection."""

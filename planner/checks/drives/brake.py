@@ -1,4 +1,4 @@
-"""Whether a joint holds its load without power."""
+"""Check that a joint holds its load without power."""
 
 from boom_model import Basis, Sourced
 from planner.checks.drives.joint_view import JointView
@@ -7,20 +7,34 @@ from planner.checks.rows import Row, Verdict
 
 
 def power_off_row(
-    view: JointView, *, demand: float, limit: float | None, at: float, brake: Sourced[bool] | None, held: str, unheld: str
+    view: JointView,
+    *,
+    demand: float,
+    limit: float | None,
+    at: float,
+    brake: Sourced[bool] | None,
+    with_brake: str,
+    without_brake: str,
 ) -> Row:
-    """The row of a joint without power: only a declared brake holds, and one that is not printed WARNs.
+    """Return the row of a joint without power.
+
+    Only a declared brake passes. A brake that is estimated or assumed WARNs.
 
     Args:
-        demand, at: the largest static torque, and its time.
-        limit: the torque that starts to drive gearbox or screw back. It is shown, and does not decide.
-        held, unheld: the source with a brake, and the reason without one.
+        view: motion of the joint.
+        demand: largest static torque.
+        limit: torque at which the gearbox or screw starts to backdrive. The row shows it, but it
+            does not decide.
+        at: time of the largest static torque [s].
+        brake: whether there is a brake; None if nothing is declared.
+        with_brake: source text added if there is a brake.
+        without_brake: source text if there is none.
     """
     if brake is not None and brake.value:
         verdict = Verdict.WARN if brake.origin.basis is not Basis.PRINTED else Verdict.PASS
-        basis, source = brake.origin.basis, f"held by a brake: {brake.origin.source}; {held}"
+        basis, source = brake.origin.basis, f"held by a brake: {brake.origin.source}; {with_brake}"
     else:
-        verdict, basis, source = Verdict.FAIL, Basis.PRINTED, unheld
+        verdict, basis, source = Verdict.FAIL, Basis.PRINTED, without_brake
     return Row(
         joint=view.joint,
         kind=CheckKind.POWER_OFF_HOLD,

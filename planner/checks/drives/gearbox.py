@@ -1,7 +1,8 @@
-"""A strain-wave gearbox against its datasheet.
+"""Checks of a strain-wave gearbox against its datasheet.
 
-The rows follow Harmonic Drive's selection procedure, applied to the Cone Drive CBG, whose maker's own procedure was not found.
-A figure that a datasheet does not give makes its row NOT CHECKABLE, never a pass.
+The rows follow Harmonic Drive's selection procedure. It is applied to the Cone Drive CBG because
+that maker's own procedure was not found. If a datasheet does not give a figure, the row is NOT
+CHECKABLE; it never passes.
 """
 
 from collections.abc import Iterator
@@ -15,25 +16,28 @@ from planner.checks.kinds import CheckKind
 from planner.checks.rows import Row, Verdict
 
 FAMILY_LIFE = 35_000.0 * 3600.0
-"""L50 of cup gearboxes of this kind at rated torque and FAMILY_INPUT_SPEED [s]; another maker's, so indicative only."""
+"""L50 of cup gearboxes of this kind at rated torque and FAMILY_INPUT_SPEED [s].
+
+It is another maker's figure, so it is indicative only.
+"""
 
 FAMILY_INPUT_SPEED = 2000.0 * 2.0 * np.pi / 60.0
-"""[rad/s]"""
+"""Input speed of FAMILY_LIFE [rad/s]."""
 
 L50_OVER_L10 = 5.0
-"""Half of them outlive L50, nine of ten L10."""
+"""L50 / L10. Half of all gearboxes outlive L50, nine of ten outlive L10."""
 
 LEAST_FREQUENCY = 8.0
-"""Guide for the first natural frequency of a base axis on its gearbox [Hz]."""
+"""Guideline for the first natural frequency of a base axis on its gearbox [Hz]."""
 
 MOMENTARY_CYCLES = 1e4
-"""Turns of the wave generator, two a revolution, that a gearbox may bear its momentary peak torque for."""
+"""Load cycles allowed at the momentary peak torque; the wave generator makes two per turn."""
 
-_PROCEDURE = "Harmonic Drive's procedure, applied to another maker's gearbox"
+_PROCEDURE = "Harmonic Drive's procedure applied to another maker's gearbox"
 
 
 def gearbox_rows(view: JointView, drive: Drive, shock: Shock | None) -> Iterator[Row]:
-    """Every gearbox row of a joint: torques, speeds, life, wind-up, lost motion, resonance, power-off."""
+    """Return every gearbox row: torque, speed, life, wind-up, lost motion, resonance, power-off."""
     gear = drive.gearbox
     procedure = Origin(Basis.PRINTED, f"{gear.source}; {_PROCEDURE}")
     yield from _torque_rows(view, gear, shock, procedure)
@@ -46,32 +50,35 @@ def gearbox_rows(view: JointView, drive: Drive, shock: Shock | None) -> Iterator
 def _torque_rows(view: JointView, gear: Gearbox, shock: Shock | None, procedure: Origin) -> Iterator[Row]:
     if shock is not None:
         peak, at = view.peak(view.tau)
-        unseen = Origin(Basis.PRINTED, "the shock is not inside the motion, or has too few samples to see its peak")
+        unseen = Origin(Basis.PRINTED, "the shock is not within the motion, or has too few samples to show its peak")
         limit, origin = (gear.peak_torque, procedure) if shock.resolved else (None, unseen)
         yield view.compared(CheckKind.GEARBOX_MOMENTARY_PEAK, demand=peak, limit=limit, at=at, origin=origin)
         yield _events_row(view, gear, shock)
-    peak, at = view.peak(view.calm)
+    peak, at = view.peak(view.tau_without_shock)
     yield view.compared(CheckKind.GEARBOX_REPEATED_PEAK, demand=peak, limit=gear.start_stop_torque, at=at, origin=procedure)
-    average = view.duty.travel_mean(view.calm, view.qd)
+    average = view.duty.travel_mean(view.tau_without_shock, view.qd)
     if average is not None:
         yield view.compared(CheckKind.GEARBOX_AVERAGE, demand=average, limit=gear.max_average_torque, origin=procedure)
-        rated = Origin(Basis.PRINTED, f"{gear.source}; rated torque, which enters the life and is no limit of its own")
+        rated = Origin(Basis.PRINTED, f"{gear.source}; rated torque, which determines the life and is not a limit")
         yield view.informative(CheckKind.GEARBOX_CONTINUOUS, figure=average, limit=gear.continuous_torque, origin=rated)
     hold, at = view.peak(view.static)
     derived = Origin(
-        Basis.PRINTED, f"{gear.source}; held for ever at the worst pose, against the average rating [own derivation]"
+        Basis.PRINTED, f"{gear.source}; static torque at the worst pose against the average torque [own derivation]"
     )
     yield view.compared(CheckKind.GEARBOX_HOLD, demand=hold, limit=gear.max_average_torque, at=at, origin=derived)
 
 
 def _events_row(view: JointView, gear: Gearbox, shock: Shock) -> Row:
-    """How often the shock may come: 1e4 / (2 (n / 60) N t), with the joint's fastest speed n while it lasts."""
+    """Return the row of the number of shocks against 1e4 / (2 (n / 60) N t).
+
+    n is the joint's largest speed during the shock [rpm], N the gear ratio, t the duration.
+    """
     kind, speed = CheckKind.GEARBOX_MOMENTARY_PEAKS, float(np.abs(view.qd[shock.inside]).max(initial=0.0))
     turns = gear.ratio * speed / (2.0 * np.pi) * shock.duration
-    allowed = MOMENTARY_CYCLES / max(2.0 * turns, 1.0)  # a shock at rest still loads the teeth once
-    origin = Origin(Basis.PRINTED, f"1e4 / (2 (n / 60) N t), at {turns:.2g} turns of the input in a shock; {_PROCEDURE}")
+    allowed = MOMENTARY_CYCLES / max(2.0 * turns, 1.0)  # a shock at rest loads the teeth once
+    origin = Origin(Basis.PRINTED, f"1e4 / (2 (n / 60) N t) with {turns:.2g} turns of the input per shock; {_PROCEDURE}")
     if shock.events is None or not shock.resolved:
-        why = f"how many shocks it is to survive is not given (it bears {allowed:.0f}); {origin.source}"
+        why = f"the number of shocks is not given (allowed: {allowed:.0f}); {origin.source}"
         return view.unknown(kind, why=why, demand=shock.events)
     return view.compared(kind, demand=shock.events, limit=allowed, origin=origin)
 
@@ -83,14 +90,17 @@ def _speed_rows(view: JointView, gear: Gearbox) -> Iterator[Row]:
         (CheckKind.GEARBOX_INPUT_SPEED, fastest, gear.max_input_speed, at),
         (CheckKind.GEARBOX_AVERAGE_INPUT_SPEED, average, gear.max_average_input_speed, None),
     ):
-        missing = "" if limit else "; no such speed is printed"
+        missing = "" if limit else "; this speed is not printed"
         sheet = Origin(Basis.PRINTED, gear.source + missing)
         yield view.compared(kind, demand=gear.ratio * speed, limit=limit, at=when, origin=sheet)
 
 
 def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
-    """L50 = L_n (n_N / n_av) (T_N / T_av)^3, against L10; the average speed counts pauses, and so does the life."""
-    average = view.duty.travel_mean(view.calm, view.qd)
+    """Return the row of the life, L10 = L50 / 5 with L50 = L_n (n_N / n_av) (T_N / T_av)^3.
+
+    Both the average speed and the life include pauses.
+    """
+    average = view.duty.travel_mean(view.tau_without_shock, view.qd)
     speed = gear.ratio * view.duty.mean(np.abs(view.qd))
     if average is None or average == 0.0:
         return
@@ -102,10 +112,8 @@ def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
     if gear.continuous_torque is not None and life is not None and rated_speed is not None:
         L10 = life * (rated_speed / speed) * (gear.continuous_torque / average) ** 3 / L50_OVER_L10
     if L10 is None or not printed:
-        figure = (
-            "" if L10 is None else f"; indicative L10 {L10 / 3600.0:,.0f} h, with 35,000 h at 2000 rpm of others of its kind"
-        )
-        why = f"{gear.source}; no rated life and speed are printed{figure}"
+        figure = "" if L10 is None else f"; indicative L10 {L10 / 3600.0:,.0f} h from 35,000 h at 2000 rpm of similar gearboxes"
+        why = f"{gear.source}; rated life or speed is not printed{figure}"
         yield view.unknown(kind, why=why, demand=asked, limit=L10)
         return
     origin = Origin(Basis.PRINTED, f"{gear.source}; L10 = L50 / 5; {_PROCEDURE}")
@@ -123,7 +131,7 @@ def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
         )
         return
     basis = Basis.weakest([origin.basis, wanted.origin.basis])
-    both = Origin(basis, f"{origin.source}; asked: {wanted.origin.source}")
+    both = Origin(basis, f"{origin.source}; required life: {wanted.origin.source}")
     yield view.compared(kind, demand=wanted.value, limit=L10, origin=both)
 
 
@@ -135,7 +143,7 @@ def _compliance_rows(view: JointView, gear: Gearbox) -> Iterator[Row]:
     yield view.informative(CheckKind.GEARBOX_BACKLASH, figure=gear.backlash, origin=sheet)
     yield view.informative(CheckKind.GEARBOX_HYSTERESIS, figure=gear.hysteresis, origin=sheet)
     inertia = float(view.inertia.max())
-    guide = Origin(Basis.PRINTED, f"sqrt(K1 / J) / (2 pi) at J = {inertia:.4g} kg m^2, against a guide; {gear.source}")
+    guide = Origin(Basis.PRINTED, f"guideline for sqrt(K1 / J) / (2 pi) at J = {inertia:.4g} kg m^2; {gear.source}")
     first = None
     if gear.torsion_stiffness is not None and inertia > 0.0:
         first = float(np.sqrt(gear.torsion_stiffness[0] / inertia) / (2.0 * np.pi))
@@ -143,7 +151,10 @@ def _compliance_rows(view: JointView, gear: Gearbox) -> Iterator[Row]:
 
 
 def _power_off_row(view: JointView, drive: Drive) -> Row:
-    """Backdriving starts somewhere about the printed torque, which is no holding margin: only a brake holds."""
+    """Return the row without power.
+
+    Backdriving starts near the printed torque, so that torque is not a holding limit.
+    """
     demand, at = view.peak(view.static)
     why = drive.gearbox.source
     return power_off_row(
@@ -152,6 +163,6 @@ def _power_off_row(view: JointView, drive: Drive) -> Row:
         limit=drive.gearbox.backdrive_torque,
         at=at,
         brake=drive.brake,
-        held=f"backdriven otherwise, {why}",
-        unheld=f"no brake is declared, and the gearbox is backdriven: {why}",
+        with_brake=f"without it the gearbox can be backdriven, {why}",
+        without_brake=f"no brake is declared and the gearbox can be backdriven: {why}",
     )

@@ -1,4 +1,4 @@
-"""One joint of a motion, as the drive checks look at it."""
+"""Motion and torques of one joint, as the drive checks read them."""
 
 from dataclasses import dataclass, replace
 
@@ -14,59 +14,64 @@ from planner.motion.trajectory import Trajectory
 
 @dataclass(frozen=True, eq=False)
 class Shock:
-    """A shock of the vehicle during a motion."""
+    """Shock of the vehicle during a motion."""
 
-    calm: Array
-    """(n, 5) the joint torques without it."""
+    tau_without_shock: Array
+    """(n, 5) joint torques without the shock."""
     resolved: bool
-    """Whether it lies inside the motion, with enough samples to see its peak."""
+    """Whether the shock lies within the motion and has enough samples to show its peak."""
     inside: Mask
-    """(n,) the samples that it lasts for"""
+    """(n,) whether each sample lies within the shock."""
     duration: float
     """[s]"""
     events: float | None
-    """How many a gearbox is to survive; None where nobody says."""
+    """Number of shocks that a gearbox must survive; None if not given."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointView:
-    """One joint of a motion. Torques are forces [N] where the joint slides."""
+    """Motion and torques (n,) of one joint. At a prismatic joint, torques are forces [N]."""
 
     joint: str
     is_length: bool
     trajectory: Trajectory
     duty: Duty
     tau: Array
-    calm: Array
-    """tau without the vehicle's shock"""
+    """Torque [Nm]."""
+    tau_without_shock: Array
+    """Torque without the vehicle's shock."""
     friction: Array
-    """what friction has in tau"""
+    """Part of `tau` that overcomes friction."""
     coulomb: float
-    """the part of it that does not go with the speed"""
+    """Coulomb friction, which does not depend on the speed."""
     static: Array
-    """what holds each pose, without friction"""
+    """Static torque at each pose, without friction."""
     inertia: Array
-    """what turns with the joint at some poses of the motion, the other joints locked [kg m^2]; the drive's own left out"""
+    """(m,) inertia at the joint with the others locked, at some poses [kg m^2], drive excluded."""
     index: int
+    """Index of the joint."""
     basis: Basis
-    """of the torques themselves"""
+    """Basis of the torques."""
     steady: bool
-    """whether the base rests or is tilted at most, so that the motion can be run backwards"""
+    """Whether the base is at rest, level or tilted, so that the reversed motion can be checked."""
 
     @property
     def t(self) -> Array:
+        """Times (n,) [s]."""
         return self.trajectory.t
 
     @property
     def qd(self) -> Array:
+        """Joint velocity (n,)."""
         return self.trajectory.qd[:, self.index]
 
     @property
     def qdd(self) -> Array:
+        """Joint acceleration (n,)."""
         return self.trajectory.qdd[:, self.index]
 
     def peak(self, values: Array) -> tuple[float, float]:
-        """The largest size of values (n,), and its time [s]."""
+        """Return the largest absolute value of values (n,), and its time [s]."""
         at = int(np.argmax(np.abs(values)))
         return float(abs(values[at])), float(self.t[at])
 
@@ -80,19 +85,20 @@ class JointView:
         at: float | None = None,
         warn_near: bool = False,
     ) -> Row:
-        """`rows.compared` of the joint; its basis is no better than the torque's."""
-        founded = self._founded(origin)
-        return compared(joint=self.joint, kind=kind, demand=demand, limit=limit, origin=founded, at=at, warn_near=warn_near)
+        """Return `rows.compared` for the joint. Its basis is at most that of the torques."""
+        origin = self._weakened(origin)
+        return compared(joint=self.joint, kind=kind, demand=demand, limit=limit, origin=origin, at=at, warn_near=warn_near)
 
     def informative(
         self, kind: CheckKind, *, figure: float | None, origin: Origin, at: float | None = None, limit: float | None = None
     ) -> Row:
-        """`rows.informative` of the joint, likewise."""
-        return informative(joint=self.joint, kind=kind, figure=figure, origin=self._founded(origin), at=at, limit=limit)
+        """Return `rows.informative` for the joint. Its basis is at most that of the torques."""
+        return informative(joint=self.joint, kind=kind, figure=figure, origin=self._weakened(origin), at=at, limit=limit)
 
     def unknown(self, kind: CheckKind, *, why: str, demand: float | None = None, limit: float | None = None) -> Row:
-        """`rows.unknown` of the joint."""
+        """Return `rows.unknown` for the joint."""
         return unknown(joint=self.joint, kind=kind, why=why, demand=demand, limit=limit)
 
-    def _founded(self, origin: Origin) -> Origin:
+    def _weakened(self, origin: Origin) -> Origin:
+        """Return the origin with the weaker of its own basis and that of the torques."""
         return replace(origin, basis=Basis.weakest([origin.basis, self.basis]))

@@ -1,4 +1,4 @@
-"""What the drives let the tip deflect along a motion: wind-up, backlash, hysteresis and step error, in an error budget."""
+"""Deflection of the tip through the drives: wind-up, backlash, hysteresis and step error."""
 
 from collections.abc import Iterator
 
@@ -13,21 +13,27 @@ from planner.motion.trajectory import Trajectory
 
 
 def tip_rows(boom: Boom, trajectory: Trajectory, tau: Array, duty: Duty, M: Array, basis: Basis) -> Iterator[Row]:
-    """The parts of the budget at their worst, their sum against the tolerance, and the arm's first frequency on its gearboxes.
+    """Return the rows of the tip.
+
+    These are the largest value of each part of the error budget, the largest sum against the
+    tolerance, and the first natural frequency of the arm on its gearboxes.
 
     Args:
+        boom: the boom.
+        trajectory: the motion.
         tau: (n, 5) joint torques.
+        duty: duty cycle, with the tolerance of the deflection.
         M: (m, 5, 5) mass matrix at some of the motion's poses.
-        basis: of the torques.
+        basis: basis of the torques.
     """
     if all(drive is None for drive in boom.drives):
         if duty.tip_tolerance is not None:
-            why = "no drive data: nothing of the budget is known"
+            why = "no drive data, so no part of the deflection is known"
             yield unknown(joint="tip", kind=CheckKind.TIP_DEFLECTION, why=why, limit=duty.tip_tolerance.value)
         return
     budget = tip_deflection(boom, trajectory.q, tau)
     left_out = f"; left out: {', '.join(budget.uncounted)}" if budget.uncounted else ""
-    origin = Origin(basis, f"tip's Jacobian on the gearboxes' figures; links are rigid{left_out}")
+    origin = Origin(basis, f"Jacobian of the tip with the gearboxes' figures; rigid links{left_out}")
     vector = budget.wind_up
     for kind, size in (
         (CheckKind.TIP_WIND_UP, np.linalg.norm(vector, axis=-1)),
@@ -43,7 +49,7 @@ def tip_rows(boom: Boom, trajectory: Trajectory, tau: Array, duty: Duty, M: Arra
     yield _total_row(float(total[at]), float(trajectory.t[at]), duty, origin, bool(budget.uncounted))
     frequencies = gear_frequencies(boom, M)
     if frequencies is not None and np.isfinite(frequencies).all():
-        text = "the arm on all gearboxes' first stiffness K1 together, other joints locked"
+        text = "arm on the first stiffness K1 of all gearboxes together; other joints locked"
         figure = float(frequencies[..., 0].min())
         yield informative(joint="tip", kind=CheckKind.TIP_FREQUENCY, figure=figure, origin=Origin(basis, text))
 
@@ -54,6 +60,6 @@ def _total_row(total: float, at: float, duty: Duty, origin: Origin, incomplete: 
         return informative(joint="tip", kind=kind, figure=total, at=at, origin=origin)
     both = Origin(Basis.weakest([origin.basis, tolerance.origin.basis]), f"{tolerance.origin.source}; {origin.source}")
     row = compared(joint="tip", kind=kind, demand=total, limit=tolerance.value, at=at, origin=both)
-    if incomplete and row.verdict is Verdict.PASS:  # what is left out can only add to it
+    if incomplete and row.verdict is Verdict.PASS:  # the parts left out only add to the sum
         return unknown(joint="tip", kind=kind, demand=total, limit=tolerance.value, at=at, why=both.source)
     return row

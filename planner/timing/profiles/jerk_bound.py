@@ -21,15 +21,19 @@ def jerk_bounded(boom: Boom, path: Path, base: BaseMotion | None = None) -> Time
     """The fastest law found within the joints' jerk limits and their others: a time-optimal one, smoothed.
 
     On a curved path the path's own shape asks for jerk, at a waypoint above all. Laws that are slow there, and there alone,
-    are tried besides.
+    are tried besides, and one on equal steps: between near waypoints it is smoother.
 
     Raises:
         InfeasiblePathError: as `time_optimal`.
     """
     laws = [time_optimal(boom, path, base)]
-    for share in () if isinstance(path, JointLine) else _SHAPE_SHARES:
+    if not isinstance(path, JointLine):
+        for share in _SHAPE_SHARES:
+            with suppress(InfeasiblePathError):
+                laws.append(time_optimal(boom, path, base, jerk_share=share))
+    if len(path.knots):
         with suppress(InfeasiblePathError):
-            laws.append(time_optimal(boom, path, base, jerk_share=share))
+            laws.append(time_optimal(boom, path, base, even=True))
     return min((with_jerk_bound(boom, path, law, base) for law in laws), key=lambda each: each.duration)
 
 
@@ -53,7 +57,7 @@ def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | Non
         smoothed = law.averaged(law.duration * 10.0**exponent)
         motion = Motion(path, smoothed)
         jerk = float(np.cbrt(peak_rate_ratios(boom, motion, motion.times(1))[2]))
-        return smoothed.stretched(max(1.0, jerk, loads.least_stretch(smoothed, smoothed.s.x)))
+        return smoothed.stretched(loads.stretch(smoothed, smoothed.s.x, max(1.0, jerk)))
 
     exponents = np.linspace(_NARROWEST, 0.0, _WINDOWS)
     least = int(np.argmin([smooth(float(exponent)).duration for exponent in exponents]))

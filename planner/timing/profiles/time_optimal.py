@@ -15,17 +15,14 @@ from toppra.solverwrapper.cy_seidel_solverwrapper import seidelWrapper
 from boom_model import BaseMotion, Boom
 from boom_model.arrays import Array
 from boom_model.drives.drive import drive_torque_tangent
+from boom_model.drives.limits import gear_limits, motor_limits, rotors, static_limits
 from planner.paths.path import JointLine, Path
 from planner.timing.path_limits import (
     PathDynamics,
     demand_ratios,
     explain_infeasible,
-    gear_limits,
-    motor_limits,
     path_dynamics,
-    rotors,
     spread,
-    static_limits,
 )
 from planner.timing.time_law import TimeLaw
 
@@ -47,12 +44,13 @@ def time_optimal(
     boom: Boom,
     path: Path,
     base: BaseMotion | None = None,
-    intervals: int = GRID_INTERVALS,
+    *,
+    even: bool = False,
     jerk_share: float | None = None,
 ) -> TimeLaw:
     """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
 
-    The path acceleration is constant over each of the `intervals` steps in s, and the conditions hold at both ends of each
+    The path acceleration is constant over each of the `GRID_INTERVALS` steps in s, and the conditions hold at both ends of each
     (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step. The steps are
     equal, and shorter between knots of the path that are near to each other. On a curved path the speed is capped where a
     limit is broken inside a step all the same, and the law solved for again.
@@ -63,6 +61,8 @@ def time_optimal(
     settle on a rough grid, from which the full one starts.
 
     Args:
+        even: whether all steps are equal, and none is looked into. Between near knots such a law is smoother, and must be
+            slowed for what it breaks.
         jerk_share: the share of the joints' jerk limits that |p'''| s'^3 may take, the part that the path's shape asks for;
             None holds it to no limit.
 
@@ -70,14 +70,14 @@ def time_optimal(
         InfeasiblePathError: no law keeps the limits, or a drive could not stop and hold its load somewhere;
             names the joint, the place, the demand and the limit.
     """
-    s = spread(path, intervals)
+    s = np.linspace(0.0, 1.0, GRID_INTERVALS + 1) if even else spread(path, GRID_INTERVALS)
     demands = path_dynamics(boom, path, s, base)
     if jerk_share is not None:
         demands = replace(demands, cap=jerk_share ** (2.0 / 3.0) * _shape_cap(boom, path, s))
     if (demands.static_ratio > 1.0).any():  # a swing might carry the load past such a place, but could not stop at it
         raise explain_infeasible(demands)
     unit = _time_scale(demands)
-    few = np.unique(np.linspace(0, len(s) - 1, min(intervals, _ROUGH_INTERVALS) + 1).astype(int))
+    few = np.unique(np.linspace(0, len(s) - 1, min(len(s) - 1, _ROUGH_INTERVALS) + 1).astype(int))
     rough, found = _iterate(demands.at(few), path, np.zeros(len(few)), unit), None
     if rough is not None:
         unit = float(_durations(s[few], rough.speed).sum())
@@ -86,7 +86,7 @@ def time_optimal(
         found = _iterate(demands, path, np.zeros_like(s), unit)
     if found is None:
         raise explain_infeasible(demands)
-    return _law(s, found) if isinstance(path, JointLine) else _repaired(demands, found, unit)
+    return _law(s, found) if even or isinstance(path, JointLine) else _repaired(demands, found, unit)
 
 
 def _shape_cap(boom: Boom, path: Path, s: Array) -> Array:

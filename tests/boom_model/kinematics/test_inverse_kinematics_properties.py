@@ -167,7 +167,7 @@ def test_a_transform_is_reached_or_refused_with_a_reason(q, shift, constraint):
 @BOUNDED
 @given(entries=st.lists(st.floats(-2.0, 2.0), min_size=16, max_size=16))
 def test_a_matrix_that_is_no_transform_is_bad_input(entries):
-    with pytest.raises(InputError, match="T is no rigid transform"):
+    with pytest.raises(InputError, match="T is not a rigid transform"):
         inverse_kinematics_of_pose(BOOM, np.reshape(entries, (4, 4)))
 
 
