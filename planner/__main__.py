@@ -30,6 +30,8 @@ def main() -> None:
         signal.signal(number, _stop)
     import warnings
 
+    # The boom's matrices are small: threads of linear algebra only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever the user's windows are drawn with
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file's name may hold any byte

@@ -55,19 +55,18 @@ def mass_matrix_and_bias(
     """
     q, qd = broadcast(q=q, qd=qd)
     shape = q.shape[:-1]
-    states = [x.reshape(-1, 5) for x in (q, qd)]
+    states, rates = q.reshape(-1, 5), qd.reshape(-1, 5)
     outside = None if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
     push = None if tip_force is None else matched("tip_force", tip_force, shape)
 
-    def of(part: slice) -> tuple[Array, Array]:
-        given = None if outside is None else [x[part] for x in outside]
-        return mass_and_bias(boom, states[0][part], states[1][part], given, None if push is None else push[part])
-
-    count = len(states[0])
-    if count <= _CHUNK:
-        M, bias = of(slice(None))
+    if len(states) <= _CHUNK:
+        M, bias = mass_and_bias(boom, states, rates, outside, push)
     else:
-        parts = [of(slice(start, start + _CHUNK)) for start in range(0, count, _CHUNK)]
+        parts = []
+        for start in range(0, len(states), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            given = None if outside is None else [x[part] for x in outside]
+            parts.append(mass_and_bias(boom, states[part], rates[part], given, None if push is None else push[part]))
         M, bias = (np.concatenate(each) for each in zip(*parts, strict=True))
     return M.reshape(*q.shape, 5), bias.reshape(q.shape)
 

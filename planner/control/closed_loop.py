@@ -12,7 +12,16 @@ from boom_model import BaseMotion, Boom, InputError, gravity_torque, inverse_dyn
 from boom_model.arrays import Array, checked
 from boom_model.dynamics.equations_of_motion import mass_matrix_and_bias
 from planner.control.design import Controller, Gains, Goals, design
-from planner.control.plant import Plant, accelerations, equilibrium, friction, spring_torque, torque_limits, twist_under
+from planner.control.plant import (
+    Plant,
+    accelerations,
+    equilibrium,
+    friction,
+    quick_index,
+    spring_torque,
+    torque_limits,
+    twist_under,
+)
 from planner.control.shaping import Impulses
 from planner.motion.vehicle import VehicleCase, base_motion
 from planner.planning import Move
@@ -234,9 +243,12 @@ def simulate(
         raise InputError(f"nothing to simulate: {len(cases)} cases for {duration:g} s")
     boom, figures = plant.boom if model is None else model, plant.figures
     T, B, E, m = figures.sampling_period, len(cases), plant.columns, len(plant.elastic)
-    steppers = np.flatnonzero([case.controller is Controller.STEPPER for case in cases])
-    inverse = np.flatnonzero([case.controller is Controller.COMPUTED_TORQUE for case in cases])
-    if steppers.size and not m:
+    steppers, inverse = (
+        quick_index([b for b, case in enumerate(cases) if case.controller is kind])
+        for kind in (Controller.STEPPER, Controller.COMPUTED_TORQUE)
+    )
+    kinds = {case.controller for case in cases}
+    if Controller.STEPPER in kinds and not m:
         raise InputError("a stepper needs an elastic gearbox for its simulation, and no joint is elastic")
     if substeps is None:
         substeps = max(1, int(np.ceil(T / LONGEST_STEP - 1e-9)))
@@ -249,15 +261,19 @@ def simulate(
     row = np.array([commands.index(case.command) for case in cases])
     grounds = _base_arrays(vehicle, half)
     pushes = None if gust is None else gust(half)
-    scheduled = [b for b, case in enumerate(cases) if len(case.gains) > 1]
+    scheduled = quick_index([b for b, case in enumerate(cases) if len(case.gains) > 1])
     Kp, Kd, Ki = (np.stack([getattr(case.gains[0], name) for case in cases]) for name in ("Kp", "Kd", "Ki"))
-    schedule = _schedule([cases[b] for b in scheduled], half[:: 2 * substeps]) if scheduled else None
+    several = [case for case in cases if len(case.gains) > 1]
+    schedule = _schedule(several, half[:: 2 * substeps]) if several else None
     light = np.array([case.controller in (Controller.PD, Controller.PID) for case in cases])[:, None]
 
     resolution = _resolutions(plant)
     keep = np.exp(-2.0 * np.pi * figures.velocity_filter_Hz * T)
     teeth, holding, drag, micro = _stepper_figures(plant)
-    pulled = np.ix_(steppers, np.array(plant.elastic)) if steppers.size else None  # torques of steppers
+    pulled = None  # torques of steppers
+    if Controller.STEPPER in kinds:
+        by_slices = isinstance(steppers, slice) and isinstance(E, slice)
+        pulled = (steppers, E) if by_slices else np.ix_(np.arange(B)[steppers], np.arange(5)[E])
     field, field_speed = (reference[:, row[steppers]][:, :, E] for reference in (table.q, table.qd))
     field = np.rint(field / micro) * micro
     alive, ended, lost = np.ones(B, dtype=bool), np.full(B, np.nan), np.full((B, 5), np.nan)
@@ -267,7 +283,7 @@ def simulate(
         """Return torques (B, 5) at half step i for positions p, velocities v, integral action."""
         w = _matvec(Kp, table.q[i][row] - p) + _matvec(Kd, table.qd[i][row] - v) + total
         u: Array = np.where(light, table.gravity[i][row], table.full[i][row]) + w
-        if inverse.size:
+        if Controller.COMPUTED_TORQUE in kinds:
             a = table.qdd[i][row[inverse]] + w[inverse]
             M, bias = mass_matrix_and_bias(boom, p[inverse], v[inverse], base=tilt)
             friction_torque = boom.friction.torque(v[inverse]) + table.gearbox_friction[i][row[inverse]]
@@ -282,8 +298,7 @@ def simulate(
             p, v = _measured(q, theta, E), _measured(qd, theta_d, E)
             u = _within(law(i, p, v, total), cap)
         if pulled is not None:
-            _, _, theta, theta_d = _split(x[steppers], m)
-            most = cap[pulled]
+            theta, theta_d, most = x[steppers, 10 : 10 + m], x[steppers, 10 + m :], cap[pulled]
             u = u.copy()
             u[pulled] = _within(most * np.sin(teeth * (field[i] - theta)) + drag * (field_speed[i] - theta_d), most)
         return u

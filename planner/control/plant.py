@@ -20,7 +20,7 @@ length L deflects it by F L^3 / (3 E I), which is the angle F L^2 / (3 E I) seen
 Bending out of the arm's plane, torsion of the links and play of the pins are left out.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -124,10 +124,8 @@ class Plant:
 
     @cached_property
     def columns(self) -> slice | list[int]:
-        """Columns of the elastic joints: a slice if they are adjacent, which NumPy indexes faster."""
-        first, count = self.elastic[0] if self.elastic else 0, len(self.elastic)
-        neighbours = self.elastic == tuple(range(first, first + count))
-        return slice(first, first + count) if neighbours else list(self.elastic)
+        """Columns of the elastic joints, as `quick_index`."""
+        return quick_index(self.elastic)
 
     @cached_property
     def elastic_rotor(self) -> Array:
@@ -143,6 +141,16 @@ class Plant:
     def spans(self) -> Array:
         """(2, m) T1 and T2 - T1, the torques over the first two segments of a gearbox [Nm]."""
         return read_only([self.breaks[:, 0], self.breaks[:, 1] - self.breaks[:, 0]])
+
+    @cached_property
+    def half_gap(self) -> Array:
+        """(m,) half of the backlash [rad]."""
+        return read_only(0.5 * self.gap)
+
+    @cached_property
+    def stick(self) -> float:
+        """Speed that scales Coulomb friction [rad/s]."""
+        return float(np.radians(self.figures.stick_deg_s))
 
     @cached_property
     def rigid_inertia(self) -> Array:
@@ -171,6 +179,15 @@ class Plant:
         if rigid:
             sentences.append(f"{', '.join(rigid)}: the gearbox is simulated as rigid and without friction")
         return tuple(sentences)
+
+
+def quick_index(indices: Sequence[int]) -> slice | list[int]:
+    """Return increasing indices as a slice if they are evenly spaced, which NumPy indexes faster."""
+    if not indices:
+        return slice(0)
+    step = indices[1] - indices[0] if len(indices) > 1 else 1
+    evenly = range(indices[0], indices[-1] + 1, step)
+    return slice(evenly.start, evenly.stop, step) if list(evenly) == list(indices) else list(indices)
 
 
 def _is_elastic(drive: Drive) -> bool:
@@ -210,7 +227,7 @@ def spring_torque(plant: Plant, q: Array, twist: Array, C: Array | None = None) 
     C = compliance(plant, q)[0] if C is None else C
     soft_1, soft_2, soft_3 = (softness + C for softness in plant.softness)
     span_1, span_2 = plant.spans
-    on_1 = np.maximum(np.abs(twist) - 0.5 * plant.gap, 0.0)
+    on_1 = np.maximum(np.abs(twist) - plant.half_gap, 0.0)
     on_2 = on_1 - span_1 * soft_1
     on_3 = on_2 - span_2 * soft_2
     size = np.minimum(on_1 / soft_1, span_1)
@@ -308,7 +325,7 @@ def friction(plant: Plant, speed: Array, load: Array) -> Array:
         speed: motor speed (..., m) at the joint [rad/s].
         load: T_s (..., m) [Nm].
     """
-    direction = np.tanh(speed / np.radians(plant.figures.stick_deg_s))
+    direction = np.tanh(speed / plant.stick)
     torque: Array = direction * (plant.coulomb + plant.loss * np.maximum(load * np.sign(speed), 0.0))
     return torque
 
@@ -348,10 +365,10 @@ def accelerations(
         passed = load + plant.damping * (theta_d - qd[:, E])
         tau[:, E] = passed
         # A bent extension pushes outwards; this conserves the energy.
-        tau[:, 3] += 0.5 * np.einsum("bm,bm,bm->b", load, load, C_4)
+        tau[:, 3] += 0.5 * np.vecdot(load * load, C_4)
         thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.elastic_rotor
     if plant.has_joint_friction:
-        direction = np.tanh(qd / np.radians(plant.figures.stick_deg_s))
+        direction = np.tanh(qd / plant.stick)
         tau -= boom.friction.viscous * qd + boom.friction.coulomb * direction
     M, bias = mass_matrix_and_bias(boom, q, qd, base=base, tip_force=tip_force)
     qdd = np.linalg.solve(M + plant.rigid_inertia, (tau - bias)[..., None])[..., 0]

@@ -53,8 +53,8 @@ def test_lqr_gives_coupled_joints_the_stated_poles_without_gravity():
     by_imaginary_part(rigid_poles(floating, gains), W * np.array([-0.8 - 0.6j, -0.4, -0.8 + 0.6j]), 1e-12)
 
 
-def test_lqr_gains_equal_python_control():
-    """The quadratic problem of the docstring, the boom's weight included, solved there."""
+def test_lqr_minimises_the_stated_integral_over_torques():
+    """python-control solves the problem of the docstring with torques as inputs; `design` states it in accelerations."""
     gains = design(PLANT, Controller.LQR, GOALS, GOAL)
     linear, M = linearise(Plant.of(BOOM, elastic=False), GOAL), mass_matrix(BOOM, GOAL, drive_inertia=True)
     a, zeta = 0.4, 0.8
