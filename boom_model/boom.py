@@ -36,6 +36,7 @@ from boom_model.plausible import (
     Range,
 )
 from boom_model.provenance import Origin, Sourced
+from boom_model.words import unknown
 
 JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
 """Joint names, in the order of q: theta1 .. theta5 of the thesis."""
@@ -265,7 +266,7 @@ class Boom:
             InputError: no such body, a mass that is not finite or not plausible, or a body without mass to scale.
         """
         if name not in self.bodies:
-            raise InputError(f"unknown body {name!r}; there are: {', '.join(self.bodies)}")
+            raise unknown("body", name, self.bodies)
         mass, old = scalar(f"mass of {name}", mass), self.bodies[name]
         if mass < 0.0 or old.mass == 0.0:
             raise InputError(
@@ -284,7 +285,7 @@ class Boom:
             InputError: no such joint, or a linear drive on a joint that turns.
         """
         if joint not in JOINTS:
-            raise InputError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
+            raise unknown("joint", joint, JOINTS)
         if isinstance(drive, LinearDrive):
             if not IS_LENGTH[JOINTS.index(joint)]:
                 raise InputError(f"{joint} turns; a linear actuator drives the extension only")
@@ -300,7 +301,7 @@ class Boom:
         try:
             return self.poses[name]
         except KeyError:
-            raise InputError(f"unknown pose {name!r}; there are: {', '.join(sorted(self.poses))}") from None
+            raise unknown("pose", name, sorted(self.poses)) from None
 
     @cached_property
     def mass(self) -> float:

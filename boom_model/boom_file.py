@@ -42,6 +42,7 @@ from boom_model.plausible import (
 )
 from boom_model.provenance import Basis, Origin, Sourced
 from boom_model.toml_file import Table, read_toml
+from boom_model.words import nearest_name
 
 BOOM_FILE = Path(str(files("boom_model") / "data" / "third_generation.toml"))
 
@@ -387,7 +388,9 @@ def _linear_drive(
 def _complain_unless_known(where: str, name: str, entries: Mapping[str, object], catalogue: str | Path | None) -> None:
     if name not in entries:
         searched = CATALOGUE_FILE.name if catalogue is None else f"{CATALOGUE_FILE.name} or {catalogue}"
-        raise InputError(f"{where}: {name!r} is not in {searched} ({', '.join(entries) or 'none'})")
+        meant = nearest_name(name, entries)
+        hint = "" if meant is None else f"; did you mean {meant}?"
+        raise InputError(f"{where}: {name!r} is not in {searched} ({', '.join(entries) or 'none'}){hint}")
 
 
 def _pose(table: _PoseTable) -> Array:

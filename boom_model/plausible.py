@@ -122,7 +122,8 @@ DIRECTION = Range(-1e3, 1e3, "")
 
 # The design of a link
 SAFETY_FACTOR = Range(1e-2, 1e3, "")
-DEFLECTION = Range(1e-6, 10.0, "m")
+TIP_ERROR = Range(1e-7, 10.0, "m")
+DEFLECTION = Range(1e-6, 1.0, "m")
 HEIGHT = Range(0.0, 10.0, "m")
 HEIGHT_STEP = Range(1e-7, 1.0, "m")
 THICKNESS = Range(1e-5, 1.0, "m")

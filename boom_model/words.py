@@ -1,4 +1,6 @@
-"""Numbers and joint positions as people write them."""
+"""Numbers, joint positions and names as people write them."""
+
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -6,6 +8,7 @@ from boom_model.arrays import Array
 from boom_model.errors import InputError
 from boom_model.plausible import NUMBER
 
+_LIKE = 0.65  # of 1; at 0.6 "elbow" would be like "lower"
 _NOTHING = 1e-12  # degrees or metres: a distance as small would ask for an infinite speed along the path
 
 
@@ -50,3 +53,29 @@ def number(name: str, text: str, what: str) -> float:
         raise InputError(f"{name}: {text!r} must be finite")
     NUMBER.require(name, value)
     return value if abs(value) > _NOTHING else 0.0
+
+
+def unknown(kind: str, name: object, known: Iterable[str], other: str = "") -> InputError:
+    """Return the error for a name that is none of the known ones. It suggests the nearest, whatever its case.
+
+    Args:
+        kind: what is named, such as "pose".
+        name: the name given.
+        known: the names there are.
+        other: what may be given instead of a name, such as "a FILE.toml".
+    """
+    names, given = list(known), str(name)
+    meant = nearest_name(given, names)
+    listed = f"{', '.join(names)}{f', or {other}' if other else ''}"
+    if meant is None:
+        return InputError(f"unknown {kind} {given!r}; there are: {listed}")
+    return InputError(f"unknown {kind} {given!r}; did you mean {meant}? There are: {listed}")
+
+
+def nearest_name(given: str, known: Iterable[str]) -> str | None:
+    """Return the known name that is most like the one given, whatever its case; None if none is like it."""
+    from difflib import get_close_matches
+
+    names = {name.lower(): name for name in known}
+    near = get_close_matches(given.lower(), names, n=1, cutoff=_LIKE)
+    return names[near[0]] if near else None

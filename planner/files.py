@@ -16,6 +16,7 @@ from pathlib import Path
 from types import TracebackType
 
 from boom_model.errors import InputError
+from boom_model.words import unknown
 
 _PREFIX = ".boom-"
 _TRIES = 20
@@ -56,6 +57,8 @@ class Outputs:
                 raise InputError(f"{path}: cannot be written: the same command reads it")
             _require_regular(place, str(path))
             self._given[place] = str(path)
+        self.replaced = frozenset(given for place, given in self._given.items() if place.exists())
+        """Names, as given, of files that were there before."""
         with self:
             pass
 
@@ -153,7 +156,7 @@ def named_file(folder: Path, name: str, kind: str) -> Path:
         return Path(name)
     known = sorted(path.stem for path in folder.glob("*.toml"))
     if name not in known:
-        raise InputError(f"unknown {kind} {name!r}; there are: {', '.join(known)}, or a FILE.toml")
+        raise unknown(kind, name, known, "a FILE.toml")
     return folder / f"{name}.toml"
 
 

@@ -43,7 +43,19 @@ class ProfileRow:
     verdict: str
 
 
-HEADER = ("profile", "duration", "velocity", "acceleration", "jerk", "gearbox", "motor torque", "motor speed", "worst stop")
+HEADER = (
+    "profile",
+    "duration",
+    "velocity",
+    "acceleration",
+    "jerk",
+    "gearbox",
+    "motor torque",
+    "motor speed",
+    "worst stop",
+    "verdict",
+)
+"""Columns of `cells`; a ratio is demand / limit."""
 
 
 def profile_moves(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[dict[str, Move], dict[str, str]]:
@@ -106,6 +118,7 @@ def cells(row: ProfileRow) -> tuple[str, ...]:
         jerk,
         *drives,
         f"{row.stop_s:.2f} s, {row.stop_m:.2f} m",
+        row.verdict,
     )
 
 

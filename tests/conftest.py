@@ -1,10 +1,14 @@
 """Fixtures that several test files share."""
 
+import os
 import sys
 
 import pytest
 
-from planner import cli
+# The matrices here are small: BLAS's own threads only get in each other's way, and in that of pytest's workers.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from planner import cli  # imports NumPy, which reads the variable then
 
 
 @pytest.fixture

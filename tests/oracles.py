@@ -206,6 +206,16 @@ def pinocchio_model(boom: Boom, *, payload_as: PayloadAs = "mass") -> pinocchio.
     return model
 
 
+def fixed_root(free: pinocchio.Model) -> pinocchio.Model:
+    """The same tree without the free-flyer at its root."""
+    model = pinocchio.Model()
+    model.gravity = free.gravity
+    for joint in range(2, free.njoints):
+        model.addJoint(free.parents[joint] - 1, free.joints[joint], free.jointPlacements[joint], free.names[joint])
+        model.appendBodyToJoint(joint - 1, free.inertias[joint], pinocchio.SE3.Identity())
+    return model
+
+
 def pinocchio_inverse_dynamics(
     boom: Boom,
     q: Array,

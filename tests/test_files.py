@@ -10,6 +10,7 @@ import pytest
 
 from boom_model import InputError
 from planner.files import Outputs, discard, replacing
+from tests.builders import hidden
 
 
 def test_new_file_takes_the_place_of_the_old_one(tmp_path):
@@ -58,10 +59,6 @@ def test_disk_that_refuses_is_an_input_error(tmp_path):
     with pytest.raises(InputError, match="No space left"), replacing(tmp_path / "out.txt"):
         raise OSError(28, "No space left on device")
     assert os.listdir(tmp_path) == []
-
-
-def hidden(folder):
-    return [name for name in os.listdir(folder) if name.startswith(".")]
 
 
 def test_files_of_one_command_appear_together(tmp_path):

@@ -10,8 +10,8 @@ from boom_model import JOINTS, Boom, InfeasibleError, forward_kinematics, invers
 from planner import MoveSpec, Verdict, plan
 from planner.suggestions import suggestions
 from planner.timing.profile import Profile
+from tests.builders import POST, ROUND_POST, with_shapes
 from tests.limits import EFFICIENCY, INERTIA, motor_allows
-from tests.paths.test_keep_out import POST, ROUND_POST, with_shapes
 
 BOOM = Boom.load()
 POSES = "transport", "phenotyping"

@@ -16,7 +16,7 @@ from boom_model.boom import Boom
 from boom_model.drives.limits import static_limits
 from boom_model.dynamics.equations_of_motion import gravity_torque
 from boom_model.errors import InputError
-from boom_model.words import joint_position, number
+from boom_model.words import joint_position, number, unknown
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,8 @@ WORDS = {
         LeastTime(),
     )
 }
-CONSTRAINTS = f"{', '.join(WORDS)}, actuator=DEG, extension=M, nearest=DEG,DEG,DEG,M,DEG"
+_VALUED = ("actuator=DEG", "extension=M", "nearest=DEG,DEG,DEG,M,DEG")
+CONSTRAINTS = ", ".join((*WORDS, *_VALUED))
 
 
 def parse_constraint(text: str) -> Constraint:
@@ -242,4 +243,4 @@ def parse_constraint(text: str) -> Constraint:
         return ActuatorAngle(float(np.radians(number("constraint actuator", rest, "degrees"))))
     if kind == "extension" and equals:
         return FixedExtension(number("constraint extension", rest, "metres"))
-    raise InputError(f"constraint {text!r} is not known; there are: {CONSTRAINTS}")
+    raise unknown("constraint", text, (*WORDS, *_VALUED))

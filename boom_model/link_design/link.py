@@ -19,6 +19,7 @@ from boom_model.link_design.materials import Material
 from boom_model.plausible import MASS, THICKNESS, WIDTH
 from boom_model.provenance import Basis, Origin
 from boom_model.toml_file import Table, read_toml
+from boom_model.words import unknown
 
 LINKS_FILE = Path(str(files("boom_model") / "data" / "links.toml"))
 
@@ -97,7 +98,7 @@ def load_link(boom: Boom, name: str, path: str | Path | None = None) -> Link:
     file = LINKS_FILE if path is None else Path(path)
     table = read_toml(file, _LinksTable).links
     if name not in LINKS or name not in table:
-        raise InputError(f"unknown link {name!r}; there are: {', '.join(n for n in LINKS if n in table)}")
+        raise unknown("link", name, (each for each in LINKS if each in table))
     g, t = boom.geometry, table[name]
     lengths = {"inner": g.L9, "lower": g.L3, "outer": g.L4, "extension": float(boom.limits.upper[3])}
     if not lengths[name] > 0.0:

@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from boom_model.errors import InputError
 from boom_model.provenance import Basis, Origin
 from boom_model.toml_file import Positive, Table, read_toml
+from boom_model.words import unknown
 
 MATERIALS_FILE = Path(str(files("boom_model") / "data" / "materials.toml"))
 
@@ -45,7 +45,7 @@ class Material:
         """
         known = read_toml(MATERIALS_FILE if path is None else Path(path), _MaterialsTable).materials
         if name not in known:
-            raise InputError(f"unknown material {name!r}; there are: {', '.join(sorted(known))}")
+            raise unknown("material", name, sorted(known))
         t = known[name]
         return Material(
             name=name,

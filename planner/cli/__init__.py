@@ -3,11 +3,13 @@
 import errno
 import os
 import sys
+from difflib import get_close_matches
+from itertools import takewhile
 
 import click
 
 from boom_model import InputError
-from planner.cli import control, drives, files, kinematics, link, moves
+from planner.cli import control, data, drives, files, kinematics, link, moves, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -26,13 +28,51 @@ def main() -> None:
     sys.exit(code)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False)
+_QUESTIONS = """\
+Can the boom make a move, and do its drives stand it?
+  boom plan transport phenotyping
+Which motors and gearboxes do for a day in the field?
+  boom size field-day
+How light may a link be?
+  boom link
+
+`boom info` shows the boom, `boom --help` every command."""
+
+
+class _Commands(click.Group):
+    """Commands that take no option of a name that they do not know.
+
+    Several commands take negative numbers as arguments, so click passes unknown options on to them as arguments.
+    """
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command's name, the command, and its arguments.
+
+        Raises:
+            click.NoSuchOption: the command has no such option; the message suggests the nearest.
+        """
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None:
+            known = ["--help", *(text for param in command.params for text in (*param.opts, *param.secondary_opts))]
+            for text in takewhile(lambda arg: arg != "--", rest):
+                option = text.partition("=")[0]
+                if option.startswith("--") and option not in known:
+                    raise click.NoSuchOption(option, possibilities=get_close_matches(option, known, n=1))
+        return name, command, rest
+
+
+@click.group(
+    cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]}, no_args_is_help=False, invoke_without_command=True
+)
 @click.version_option(package_name="boom", prog_name="boom")
-def cli() -> None:
+@click.pass_context
+def cli(ctx: click.Context) -> None:
     """Plan, check and watch the moves of the third-generation phenotyping boom.
 
     Angles are in degrees and lengths in metres; files and JSON are in SI.
     """
+    if ctx.invoked_subcommand is None:
+        click.echo(_QUESTIONS)
 
 
 for _command in (
@@ -40,6 +80,7 @@ for _command in (
     moves.profiles,
     moves.check,
     moves.torque,
+    kinematics.fk,
     kinematics.ik,
     kinematics.reach,
     drives.mission,
@@ -50,7 +91,10 @@ for _command in (
     files.export_model,
     files.compare,
     files.validate,
-    files.view,
+    view.view,
+    data.info,
+    data.catalogue,
+    data.new,
 ):
     _command.params.append(
         click.Option(["-q", "--quiet"], is_flag=True, expose_value=False, callback=quieten, help="Print errors alone.")

@@ -8,6 +8,8 @@ import click
 
 from boom_model import InputError
 from boom_model.plausible import BANDWIDTH, DAMPING, INTEGRAL, PAYLOAD_ERROR, TIP_TOLERANCE
+from boom_model.words import unknown
+from planner.cli.completion import OutFile
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -87,7 +89,7 @@ if TYPE_CHECKING:
     "--set", "figures", multiple=True, metavar="NAME=VALUE",
     help="A figure that is assumed otherwise, as the report names it: rate_Hz, structural_damping, ...; may be given again.",
 )  # fmt: skip
-@click.option("--out", metavar="FILE.rrd", help="The recording, for `boom view`.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="The recording, for `boom view`.")
 @click.option("--loops", metavar="FILE.png", help="Bode diagrams and poles as a picture.")
 @click.option("--errors", metavar="FILE.png", help="The tip's errors as a picture.")
 @report_option
@@ -232,5 +234,5 @@ def _several(what: str, text: str, known: Sequence[str]) -> list[str]:
     names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         if name not in known:
-            raise InputError(f"{what} is {name!r}; there are: {', '.join(known)}, or all")
+            raise unknown(what, name, known, "all")
     return names

@@ -6,6 +6,7 @@ import click
 
 from boom_model import InfeasibleError, InputError
 from boom_model.plausible import VOLTAGE
+from planner.cli.completion import OneOf, joints, missions
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -26,8 +27,14 @@ from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json
 
 
 @click.command()
-@click.argument("missions", metavar="MISSION...", nargs=-1, required=True)
-@click.option("--joint", "joints", multiple=True, help="Compare the drive checks of this joint alone; may be given again.")
+@click.argument("missions", metavar="MISSION...", nargs=-1, required=True, shell_complete=missions)
+@click.option(
+    "--joint",
+    "joints",
+    multiple=True,
+    shell_complete=joints,
+    help="Compare the drive checks of this joint alone; may be given again.",
+)
 @payload_option
 @payload_as_option
 @vehicle_option
@@ -118,8 +125,10 @@ def mission(
 
 
 @click.command()
-@click.argument("mission", default="field-day")
-@click.option("--joint", "joints", multiple=True, help="Size this joint; may be given again; else every one.")
+@click.argument("mission", default="field-day", shell_complete=missions)
+@click.option(
+    "--joint", "joints", multiple=True, shell_complete=joints, help="Size this joint; may be given again; else every one."
+)
 @click.option(
     "--voltage",
     "voltages",
@@ -130,9 +139,13 @@ def mission(
     help="Bus voltage to try; may be given again.",
 )
 @click.option(
-    "--adapt", type=click.Choice(["nothing", "rescale", "replan"]), default="nothing", show_default=True,
+    "--adapt",
+    type=OneOf(["nothing", "rescale", "replan"]),
+    metavar="nothing|rescale|replan",
+    default="nothing",
+    show_default=True,
     help="What may change to suit a drive: the moves slowed evenly, or planned anew.",
-)  # fmt: skip
+)
 @click.option(
     "--variant", "variants", multiple=True, metavar="BODY=KG,...",
     help="A boom of other masses beside the given one, payload=KG among them; may be given again.",
@@ -172,6 +185,8 @@ def size(
     from planner.sizing.pictures import sizing_pictures
     from planner.sizing.tables import (
         SAVING,
+        answer_rows,
+        conclusion,
         motors,
         no_motion,
         not_checked,
@@ -209,8 +224,10 @@ def size(
         print_json(sizing_json(asked.name, choices, notes) | {"files": written})
     else:
         print_lines(None, [f"mission {asked.name}, payload {boom.payload.mass:g} kg"])
-        print_rows(SAVING, saving(choices))
+        print_lines(None, conclusion(choices))
+        print_rows(*answer_rows(choices), drop=("fitted", "mass"))
         if whole:
+            print_rows(SAVING, saving(choices))
             for choice in (choice for choice in choices if choice.judged):
                 print_lines(None, [f"{choice.joint}, {choice.variant}"])
                 print_rows(*ranking(choice), drop=("warnings", "moving", "mass"))
@@ -223,6 +240,7 @@ def size(
             print_lines("not checked", (f"{joints}: {reason}" for joints, reason in not_checked(choices)))
             print_lines(None, [f"{len(notes)} notes, every drive ranked: --all lists them"])
         print_files(written)
+        print_lines("next", [] if whole else [f"boom size {mission} --report drives.pdf"])
     unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]
     if unmet:
         complain(f"no drive of the catalogue does the mission: {'; '.join(unmet)}")

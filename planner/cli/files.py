@@ -1,19 +1,27 @@
-"""Exports and imports, the validation against the thesis, and the viewer."""
+"""Exports and imports, and the validation against the thesis."""
 
-import subprocess
-import sys
 from typing import Any
 
 import click
 
 from boom_model import Boom, InputError
-from boom_model.plausible import TIME, WINDOW
-from planner.cli.options import boom_option, json_option, load_boom, outputs, payload_as_option, payload_option, plausible
+from boom_model.plausible import TIME, TIP_ERROR, WINDOW
+from planner.cli.completion import OutFile
+from planner.cli.options import (
+    all_option,
+    boom_option,
+    json_option,
+    load_boom,
+    outputs,
+    payload_as_option,
+    payload_option,
+    plausible,
+)
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows
 
 
 @click.command()
-@click.argument("motion", metavar="IN")
+@click.argument("motion", type=click.Path(), metavar="IN")
 @click.argument("out", metavar="OUT")
 def export(motion: str, out: str) -> int:
     """Turn a motion into another tool's form, by the ending of OUT.
@@ -83,20 +91,30 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     metavar="S",
     help="Width of the filter that differentiates the log; else 0.2 s.",
 )
-@click.option("--out", metavar="FILE.rrd", help="A recording of both, for `boom view`.")
+@click.option(
+    "--tolerance",
+    type=float,
+    callback=plausible(TIP_ERROR),
+    metavar="M",
+    help="Largest tip error allowed.",
+)
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of both, for `boom view`.")
 @payload_option
 @payload_as_option
 @boom_option
+@all_option
 @json_option
 def compare(
     planned: str,
     measured: str,
     offset: str,
     window: float | None,
+    tolerance: float | None,
     out: str | None,
     payload: float | None,
     payload_as: Any,
     boom_file: str | None,
+    whole: bool,
     as_json: bool,
 ) -> int:
     """Hold a measured motion against its plan: where joints and tip were, and what torques that takes.
@@ -136,22 +154,33 @@ def compare(
             write_comparison_recording(files.temporary(out), found)
         written["recording"] = out
     answer = found.to_json(written)
+    peak = answer["tip"]["peak_m"]
+    failed = tolerance is not None and peak > tolerance
+    answer |= {"tolerance_m": tolerance, "verdict": None if tolerance is None else "FAIL" if failed else "PASS"}
+    words = "" if tolerance is None else f"tip error {peak * 1e3:.2f} mm of {tolerance * 1e3:g} mm"
     if as_json:
         print_json(answer)
-        return 0
-    _print_comparison(answer)
-    return 0
+    else:
+        times = f"{answer['samples']} samples from {answer['from_s']:.3f} to {answer['to_s']:.3f} s"
+        _print_comparison(
+            answer, f"{measured} against {planned}, {times}", f"{answer['verdict']}: {words}" if words else None, whole
+        )
+    if failed:
+        complain(words)
+    return ANSWER_IS_NO if failed else 0
 
 
 @click.command()
+@all_option
 @json_option
-def validate(as_json: bool) -> int:
+def validate(whole: bool, as_json: bool) -> int:
     """The thesis's tables 2-5 to 2-8 and 3-2 and its sections 3.5 and 3.6, row by row, against this model.
 
     \b
     Example:
       boom validate
     """
+    from planner.validation.tables import ROW_HEADER, by_table, row_cells
     from planner.validation.tables import validate as validate_model
 
     rows = validate_model(Boom.load())
@@ -160,41 +189,33 @@ def validate(as_json: bool) -> int:
         listed = [{**vars(row), "ok": row.ok} for row in rows]
         print_json({"ok": failed == 0, "rows": listed})
     else:
-        header = ("table", "row", "quantity", "expected", "actual", "tolerance", "ok", "note")
-        cells = []
-        for row in rows:
-            numbers = (f"{row.expected:.6g}", f"{row.actual:.5f}", f"{row.tolerance:.1g}")
-            cells.append((row.table, row.row, row.quantity, *numbers, "OK" if row.ok else "FAIL", row.note))
-        print_rows(header, cells)
-        click.echo(f"{len(rows) - failed} of {len(rows)} rows hold")
+        print_lines(None, [f"{len(rows) - failed} of {len(rows)} rows hold"])
+        print_rows(("table", "values", "hold", "largest difference, of its tolerance"), by_table(rows))
+        shown = rows if whole else [row for row in rows if not row.ok]
+        if shown:
+            print_rows(ROW_HEADER, map(row_cells, shown), drop=("note", "quantity"))
+        if not whole:
+            click.echo("--all lists every value with its note")
     if failed:
         complain(f"{failed} of {len(rows)} rows do not hold")
     return ANSWER_IS_NO if failed else 0
 
 
-@click.command()
-@click.argument("recording", metavar="FILE.rrd", type=click.Path(exists=True, dir_okay=False))
-def view(recording: str) -> int:
-    """Open a recording in the Rerun viewer.
+def _print_comparison(answer: dict[str, Any], asked: str, verdict: str | None, whole: bool) -> None:
+    from planner.experiments import comparison
 
-    \b
-    Example:
-      boom view move.rrd
-    """
-    return subprocess.run([sys.executable, "-m", "rerun", "--bind", "127.0.0.1", recording], check=False).returncode
-
-
-def _print_comparison(answer: dict[str, Any]) -> None:
-    from planner.experiments.comparison import POSITION_HEADER, TORQUE_HEADER, position_cells, summary, torque_cells
-
-    for title, header, cells in (
-        ("Positions, measured less planned", POSITION_HEADER, position_cells),
-        ("Torques on level ground: the model's of the measured motion less the plan's, and the log's less the model's",
-         TORQUE_HEADER, torque_cells),
-    ):  # fmt: skip
-        click.echo(title)
-        print_rows(header, map(cells, answer["joints"]))
-    print_lines("Note", tuple(answer["notes"]))
-    for line in summary(answer):
-        click.echo(line)
+    print_lines(None, [asked, *([] if verdict is None else [verdict])])
+    print_lines(None, comparison.summary(answer))
+    print_rows(comparison.ANSWER_HEADER, map(comparison.answer_cells, answer["joints"]), drop=("RMS", "at"))
+    if whole:
+        for title, header, cells in (
+            ("Positions, measured less planned", comparison.POSITION_HEADER, comparison.position_cells),
+            ("Torques of the measured motion less the plan's", comparison.TORQUE_HEADER, comparison.torque_cells),
+            ("Torques of the log less the model's", comparison.LOGGED_HEADER, comparison.logged_cells),
+        ):
+            click.echo(title)
+            print_rows(header, map(cells, answer["joints"]))
+        print_lines("note", answer["notes"])
+    else:
+        print_lines(None, [f"{len(answer['notes'])} notes, noise, means: --all lists them"])
     print_files(answer["files"])

@@ -5,11 +5,30 @@ from typing import Any
 import click
 import numpy as np
 
-from boom_model import InfeasibleError, InputError, inverse_kinematics
+from boom_model import (
+    JOINTS,
+    InfeasibleError,
+    InputError,
+    forward_kinematics,
+    gravity_torque,
+    inverse_kinematics,
+    transmission_angle,
+)
+from boom_model.boom import IS_LENGTH, LOAD_UNITS
 from boom_model.kinematics.constraints import parse_constraint
-from planner.cli.options import boom_option, constraint_option, json_option, load_boom, outputs, payload_option, pitch_option
+from planner.cli.completion import targets
+from planner.cli.options import (
+    boom_option,
+    constraint_option,
+    json_option,
+    load_boom,
+    outputs,
+    payload_option,
+    pitch_doubts,
+    pitch_option,
+)
 from planner.cli.printing import print_files, print_json, print_lines, print_rows
-from planner.paths.targets import parse_pitch, unreachable
+from planner.paths.targets import TipTarget, parse_pitch, parse_target, unreachable
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
@@ -52,8 +71,51 @@ def ik(
             broken += [f"branch {i + 1}: {text}" for text in s.reasons]
         print_rows(("branch", "yaw deg", "inner deg", "lower deg", "extension m", "wrist deg", "in limits"), rows)
         print_lines(None, broken)
+    if not as_json:
+        print_lines("note", pitch_doubts(angle))
     if reason is not None:
         raise InfeasibleError(reason)
+    return 0
+
+
+@click.command(context_settings={"ignore_unknown_options": True})
+@click.argument("joints", metavar="POSE|q=YAW,INNER,LOWER,EXTENSION,WRIST", shell_complete=targets)
+@boom_option
+@json_option
+def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
+    """Show where the tip is at a joint position, in the base frame, and what holding it takes of each joint.
+
+    \b
+    Examples:
+      boom fk phenotyping
+      boom fk q=0,90,180,0.5,0
+    """
+    boom, target = load_boom(boom_file), parse_target(joints)
+    if isinstance(target, TipTarget):
+        raise InputError(f"{joints}: a tip target has no joint position yet; boom ik X Y Z finds those that reach it")
+    q = boom.pose(target) if isinstance(target, str) else np.asarray(target)
+    tip, tau = forward_kinematics(boom, q), np.round(gravity_torque(boom, q), 9) + 0.0
+    reasons = boom.limits.reasons(q)
+    if as_json:
+        print_json(
+            {
+                "q": q.tolist(),
+                "position_m": tip.position.tolist(),
+                "pitch_rad": float(tip.pitch),
+                "transmission_angle_rad": float(transmission_angle(q)),
+                "gravity_torque": tau.tolist(),
+                "within_limits": not reasons,
+                "reasons": reasons,
+            }
+        )
+        return 0
+    x, y, z = tip.position
+    click.echo(f"tip at x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, pitch {np.degrees(tip.pitch):.2f} deg")
+    shown = zip(JOINTS, np.where(IS_LENGTH, q, np.degrees(q)), tau, LOAD_UNITS, IS_LENGTH, strict=True)
+    rows = [(name, f"{at:.4f} {'m' if length else 'deg'}", f"{load:.2f} {unit}") for name, at, load, unit, length in shown]
+    print_rows(("joint", "position", f"to hold {boom.payload.mass:g} kg"), rows)
+    click.echo(f"transmission angle {np.degrees(transmission_angle(q)):.1f} deg; 0 deg is a flat parallelogram")
+    print_lines("outside the limits", reasons)
     return 0
 
 
@@ -119,9 +181,12 @@ def reach(pitch: str, constraint: str, payload: float | None, out: str, boom_fil
     if as_json:
         print_json(answer)
         return 0
-    click.echo(
-        f"{answer['within_limits']} of {answer['cells']} cells are reached within the limits: r up to "
-        f"{answer['largest_r_m']:.2f} m, z from {answer['lowest_z_m']:.2f} to {answer['highest_z_m']:.2f} m"
+    print_lines(
+        None,
+        [
+            f"{answer['within_limits']} of {answer['cells']} cells are reached within the limits: r up to "
+            f"{answer['largest_r_m']:.2f} m, z from {answer['lowest_z_m']:.2f} to {answer['highest_z_m']:.2f} m"
+        ],
     )
     if known:
         click.echo(f"torque margin {margin.min():.3f} to {margin.max():.3f}; {answer['overloaded']} cells overload a drive")

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boom_model import Boom, InfeasibleError, InputError
+from planner.cli.completion import OneOf, OutFile
 from planner.cli.options import (
+    all_option,
     boom_option,
     given_catalogue,
     json_option,
@@ -33,17 +35,21 @@ _TASK_OPTIONS: tuple[Callable[[_Command], _Command], ...] = (
     click.option(
         "--link", "name", default="inner", show_default=True, metavar="inner|lower|outer|extension", help="Which link."
     ),
-    click.option("--links", metavar="FILE.toml", help="Plates and fittings of your own links; else the shipped ones."),
+    click.option(
+        "--links", type=click.Path(), metavar="FILE.toml", help="Plates and fittings of your own links; else the shipped ones."
+    ),
     click.option(
         "--load",
-        type=click.Choice(["moves", "thesis"]),
+        type=OneOf(["moves", "thesis"]),
+        metavar="moves|thesis",
         default="moves",
         show_default=True,
         help="Every instant of the moves, or the thesis's load case.",
     ),
     click.option(
         "--method",
-        type=click.Choice(["exact", "thesis"]),
+        type=OneOf(["exact", "thesis"]),
+        metavar="exact|thesis",
         default="exact",
         show_default=True,
         help="Least mass by its optimality conditions, or the thesis's two-stage search.",
@@ -98,18 +104,26 @@ def task_options(command: _Command) -> _Command:
     "--move", "moves", nargs=2, multiple=True, metavar="START GOAL", help="A move that loads the link; may be given again."
 )
 @click.option(
-    "--motion", "motions", multiple=True, metavar="FILE.csv", help="A motion that loads the link; may be given again."
+    "--motion",
+    "motions",
+    type=click.Path(),
+    multiple=True,
+    metavar="FILE.csv",
+    help="A motion that loads the link; may be given again.",
 )
 @payload_option
-@click.option("--out", metavar="FILE.rrd", help="A recording of the design.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of the design.")
 @click.option("--picture", metavar="FILE.png", help="Contour, stress, convergence, torque and mass.")
 @report_option
 @click.option("--convergence", is_flag=True, help="Studies by slices, delta-H and elements, in the JSON.")
 @click.option("--contour", metavar="FILE.txt", help="x, H/2, 0 for a CAD curve.")
-@click.option("--csv", "csv_file", metavar="FILE.csv", help="Heights, sections, forces and stress at the stations.")
+@click.option(
+    "--csv", "csv_file", type=OutFile(".csv"), metavar="FILE.csv", help="Heights, sections, forces and stress at the stations."
+)
 @click.option("--dxf", metavar="FILE.dxf", help="Outline of one plate in millimetres.")
 @click.option("--out-boom", metavar="FILE.toml", help="The boom with the new link, for `boom plan --boom`.")
 @boom_option
+@all_option
 @json_option
 def link(
     task: "LinkTask",
@@ -125,6 +139,7 @@ def link(
     dxf: str | None,
     out_boom: str | None,
     boom_file: str | None,
+    whole: bool,
     as_json: bool,
 ) -> int:
     """Design a link: the least mass that holds stress, deflection and buckling, and what it does to the joint's torque.
@@ -159,16 +174,16 @@ def link(
         raise
     written = {kind: file for kind, file in (named | {"report": document}).items() if file is not None}
     _write(files, design, written, boom_file)
-    _print_design(design, written, as_json, convergence)
+    _print_design(design, written, whole, as_json, convergence)
     return 0
 
 
 def _loading(boom: Boom, moves: Sequence[tuple[str, str]], motions: Sequence[str], planning: Any) -> list["Trajectory"]:
     """The motions that load the link: those of files, and the given moves with every profile."""
-    from planner.motion.trajectory import read_csv
+    from planner.motion.motion_files import read_motion
     from planner.planning import plan_each_profile
 
-    trajectories = [read_csv(motion) for motion in motions]
+    trajectories = [read_motion(motion) for motion in motions]
     for start, goal in moves:
         trajectories += plan_each_profile(boom, parse_target(start), parse_target(goal), planning)
     return trajectories
@@ -206,7 +221,7 @@ def _write(files: "Outputs", design: "LinkDesign", written: dict[str, str], boom
                 write_document(place, to_markdown(design), link_pictures(design))
 
 
-def _print_design(design: "LinkDesign", written: dict[str, str], as_json: bool, convergence: bool) -> None:
+def _print_design(design: "LinkDesign", written: dict[str, str], whole: bool, as_json: bool, convergence: bool) -> None:
     from planner.links import report as link_report
 
     if as_json:
@@ -218,12 +233,19 @@ def _print_design(design: "LinkDesign", written: dict[str, str], as_json: bool, 
         print_json(answer)
         return
     print_lines(None, [link_report.title(design)])
-    for header, rows in (
-        (link_report.ROWS_HEADER, link_report.rows(design)),
+    rows = link_report.rows(design)
+    checks = [row for row in rows if row[0].startswith("check:")]
+    for header, shown in (
+        (link_report.ROWS_HEADER, rows if whole else [row for row in rows if row not in checks]),
         (link_report.MOTORS_HEADER, link_report.motor_rows(design)),
     ):
-        if rows:
-            print_rows(header, rows)
+        if shown:
+            print_rows(header, shown)
     print_lines(None, link_report.sentences(design))
-    print_lines("note", design.notes)
+    print_lines("warning", design.warnings)
+    if whole:
+        print_lines("note", design.notes)
+    else:
+        print_lines(None, [f"{len(checks)} checks by finite elements, {len(design.notes)} notes: --all lists them"])
     print_files(written)
+    print_lines("next", [] if "boom" in written else ["boom link --out-boom lighter.toml"])

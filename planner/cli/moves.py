@@ -1,5 +1,6 @@
 """Jobs on one move: plan it, compare its profiles, its torques, and the checks of any motion."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
@@ -7,10 +8,12 @@ import click
 import numpy as np
 
 from boom_model import Boom, InfeasibleError, InputError
+from planner.cli.completion import OutFile
 from planner.cli.options import (
     all_option,
     boom_option,
     check_picture,
+    doubts,
     json_option,
     load_boom,
     load_vehicle,
@@ -22,22 +25,46 @@ from planner.cli.options import (
     report_option,
     vehicle_option,
 )
-from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
+from planner.cli.printing import (
+    ANSWER_IS_NO,
+    STYLES,
+    complain,
+    print_files,
+    print_json,
+    print_lines,
+    print_report,
+    print_rows,
+    tracked,
+)
+from planner.cli.view import require_screen, show
 from planner.move_spec import MoveSpec, MoveWords
 
 if TYPE_CHECKING:
     from planner.files import Outputs
     from planner.planning import Move
+    from planner.profile_table import ProfileRow
     from planner.reports.report import Report
+
+
+_LEAST_ASKED = ("motor speed", "acceleration", "velocity", "jerk")
+"""Columns that a narrow terminal leaves out of the table of profiles."""
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that -0.5 is a number
 @move_options()
 @payload_option
-@click.option("--out", default="move.rrd", show_default=True, metavar="FILE.rrd", help="The recording, for `boom view`.")
-@click.option("--csv", "csv_file", metavar="FILE.csv", help="The motion with its torques.")
+@click.option(
+    "--out",
+    type=OutFile(".rrd"),
+    default="move.rrd",
+    show_default=True,
+    metavar="FILE.rrd",
+    help="The recording, for `boom view`.",
+)
+@click.option("--csv", "csv_file", type=OutFile(".csv"), metavar="FILE.csv", help="The motion with its torques.")
 @report_option
 @picture_option
+@click.option("--view", "then_view", is_flag=True, help="Open the recording in the viewer.")
 @click.option("--show-reach", is_flag=True, help="Draw the workspace under --pitch and --constraint in the recording.")
 @boom_option
 @all_option
@@ -49,6 +76,7 @@ def plan(
     csv_file: str | None,
     picture: str | None,
     document: str | None,
+    then_view: bool,
     show_reach: bool,
     boom_file: str | None,
     whole: bool,
@@ -67,18 +95,24 @@ def plan(
       boom plan transport phenotyping --via q=40,60,120,0.3,0 --pass-via --profile time-optimal --jerk-bound --rate 250
     """
     check_picture(picture)
+    if then_view:
+        require_screen()
     files = outputs(out, csv_file, picture, document=document, inputs=(boom_file, move.vehicle))
     boom, spec = load_boom(boom_file, payload), move.spec()
     if show_reach and spec.pitch is None:
         raise InputError("pitch free: the workspace is drawn for one pitch")
     planned = _planned(boom, spec, as_json)
     report = planned.full_report if whole or as_json or document is not None else planned.report
+    report = replace(report, notes=(*report.notes, *doubts(spec)))
     if report.verdict == "FAIL":
         report = replace(report, suggestions=_fixes(boom, spec))
     written = {"recording": out, "csv": csv_file, "picture": picture, "report": document}
     _write(files, planned, report, written, spec if show_reach else None)
     asked = f"{move.start} to {move.goal}, {report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg"
-    return print_report(report, asked, _given(written), as_json, whole, f"boom view {out}")
+    code = print_report(report, asked, _given(written), as_json, whole, f"boom view {out}")
+    if then_view:
+        show(out)
+    return code
 
 
 def _planned(boom: Boom, spec: MoveSpec, as_json: bool) -> "Move":
@@ -146,7 +180,9 @@ def _given(written: dict[str, str | None]) -> dict[str, str]:
 @click.command(context_settings={"ignore_unknown_options": True})
 @move_options("profile", "via_velocity", "along", "duration", "jerk_bound", "average_torque", "rate", "vehicle")
 @payload_option
-@click.option("--out", metavar="FILE.rrd", help="A recording of all of them over each other, for `boom view`.")
+@click.option(
+    "--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of all of them over each other, for `boom view`."
+)
 @boom_option
 @json_option
 def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file: str | None, as_json: bool) -> int:
@@ -172,17 +208,33 @@ def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file:
     if as_json:
         print_json({"profiles": [asdict(row) for row in rows], "refused": refused, "files": written})
     else:
-        click.echo(f"{move.start} to {move.goal}, payload {boom.payload.mass:g} kg; each ratio is demand / limit")
-        print_rows(HEADER, map(cells, rows), drop=("motor speed", "acceleration", "velocity", "jerk"))
+        print_lines(None, [f"{move.start} to {move.goal}, payload {boom.payload.mass:g} kg; each ratio is demand / limit"])
+        print_rows(
+            HEADER,
+            map(cells, rows),
+            drop=("motor speed", "acceleration", "velocity", "jerk"),
+            styles=[STYLES.get(row.verdict) for row in rows],
+        )
         print_lines("refused", (f"{name}: {reason}" for name, reason in refused.items()))
         print_files(written)
+        print_lines("next", _quickest(move, rows))
     if failed:
         complain("; ".join(failed))
     return ANSWER_IS_NO if failed else 0
 
 
+def _quickest(move: MoveWords, rows: Sequence["ProfileRow"]) -> list[str]:
+    """The command that plans the quickest profile without a FAIL, if there is one."""
+    possible = [row for row in rows if row.verdict != "FAIL"]
+    if not possible:
+        return []
+    name = min(possible, key=lambda row: row.duration_s).profile
+    words = name.replace(", jerk bound", " --jerk-bound")
+    return [f"boom plan {move.start} {move.goal} --profile {words}"]
+
+
 @click.command()
-@click.argument("motion", metavar="IN")
+@click.argument("motion", type=click.Path(), metavar="IN")
 @click.option("--out", required=True, metavar="OUT", help="The motion with its torques: .csv, .parquet, .yaml or .json.")
 @payload_option
 @payload_as_option
@@ -222,11 +274,11 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 
 
 @click.command()
-@click.argument("motion", metavar="IN")
+@click.argument("motion", type=click.Path(), metavar="IN")
 @payload_option
 @payload_as_option
 @vehicle_option
-@click.option("--out", metavar="FILE.rrd", help="A recording of the motion, for `boom view`.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of the motion, for `boom view`.")
 @report_option
 @picture_option
 @boom_option
@@ -261,5 +313,6 @@ def check(
     written = {"recording": out, "picture": picture, "report": document}
     _write(files, move, move.report, written)
     asked = f"{motion}, {move.report.duration:.3f} s, payload {boom.payload.mass:g} kg"
-    then = f"boom check {motion} --out checked.rrd" if out is None else f"boom view {out}"
+    carried = "" if payload is None else f" --payload {payload:g}"
+    then = f"boom check {motion}{carried} --out checked.rrd" if out is None else f"boom view {out}"
     return print_report(move.report, asked, _given(written), as_json, whole, then)

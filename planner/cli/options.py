@@ -6,15 +6,21 @@ from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
+from click.core import ParameterSource
 
 from boom_model import Boom, InputError
 from boom_model.plausible import Range
-from planner.move_spec import MoveWords, Word
+from planner.cli.completion import OneOf, constraints, targets, vehicles
+from planner.cli.printing import REPLACED
+from planner.move_spec import MoveSpec, MoveWords, Word
+from planner.paths.targets import TipTarget
 
 if TYPE_CHECKING:
     from planner.files import Outputs
     from planner.motion.vehicle import VehicleCase
 
+_ANGLES, _LIKE_RADIANS = 15.0, 0.3  # [deg] pitches that people ask for, and how near to one is meant
 _CATALOGUE = "boom.catalogue"
 _Command = Callable[..., Any]
 
@@ -31,6 +37,7 @@ def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any]
 
 
 _WORDS = {field.name: field for field in fields(MoveWords) if "word" in field.metadata}
+_COMPLETE = {"via": targets, "constraint": constraints, "vehicle": vehicles}
 
 
 def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -> Callable[[_Command], _Command]:
@@ -38,7 +45,7 @@ def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -
     field = _WORDS[name]
     word: Word = field.metadata["word"]
     standard = field.default if default is MISSING else default
-    kinds: dict[str, Any] = {"default": standard, "help": help or word.help}
+    kinds: dict[str, Any] = {"default": standard, "help": help or word.help, "shell_complete": _COMPLETE.get(name)}
     if isinstance(field.default, bool):
         kinds |= {"is_flag": True}
     elif isinstance(field.default, tuple):
@@ -46,7 +53,7 @@ def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -
     elif word.quantity is not None:
         kinds |= {"type": float, "callback": plausible(word.quantity), "metavar": word.form}
     elif word.choices:
-        kinds |= {"type": click.Choice(word.choices), "show_default": True}
+        kinds |= {"type": OneOf(word.choices), "show_default": True, "metavar": "|".join(word.choices)}
     else:
         kinds |= {"metavar": word.form, "show_default": standard is not None}
     return click.option(f"--{name.replace('_', '-')}", **kinds)
@@ -65,14 +72,18 @@ def move_options(*left_out: str) -> Callable[[_Command], _Command]:
         decorated: _Command = run
         for name in reversed(names):
             decorated = word_option(name)(decorated)
-        return click.argument("start")(click.argument("goal")(decorated))
+        goal = click.argument("goal", shell_complete=targets)
+        return click.argument("start", shell_complete=targets)(goal(decorated))
 
     return decorate
 
 
-_boom_option = click.option("--boom", "boom_file", metavar="FILE.toml", help="A boom of your own; otherwise the shipped one.")
+_boom_option = click.option(
+    "--boom", "boom_file", type=click.Path(), metavar="FILE.toml", help="A boom of your own; otherwise the shipped one."
+)
 _catalogue_option = click.option(
     "--catalogue",
+    type=click.Path(),
     metavar="FILE.toml",
     expose_value=False,
     callback=lambda context, _, value: context.meta.update({_CATALOGUE: value}),
@@ -87,13 +98,17 @@ def boom_option(command: _Command) -> _Command:
 
 payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; otherwise the boom's own.")
 payload_as_option = click.option(
-    "--payload-as", type=click.Choice(["mass", "force"]), default="mass", show_default=True,
+    "--payload-as", type=OneOf(["mass", "force"]), metavar="mass|force", default="mass", show_default=True,
     help="Accelerate the payload with the tip, or only hang its weight there, as the thesis does.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
 all_option = click.option("--all", "whole", is_flag=True, help="Every row, every assumption and every note.")
 report_option = click.option(
-    "--report", "document", metavar="FILE.md|.html|.pdf", help="The report as a document, with pictures, versions and command."
+    "--report",
+    "document",
+    type=click.Path(),
+    metavar="FILE.md|.html|.pdf",
+    help="The report as a document, with pictures, versions and command.",
 )
 vehicle_option = word_option("vehicle")
 pitch_option = word_option("pitch")
@@ -120,6 +135,26 @@ def load_vehicle(vehicle: str | None) -> "VehicleCase":
     return LEVEL if vehicle is None else load_case(vehicle)
 
 
+def doubts(spec: MoveSpec) -> tuple[str, ...]:
+    """Return what the options given are not likely to mean: a constraint of no tip target, a pitch in radians."""
+    source, given = click.get_current_context().get_parameter_source, []
+    if not any(isinstance(target, TipTarget) for target in spec.targets):
+        given = [f"--{name} has no effect: no target is a tip=X,Y,Z" for name in ("constraint", "pitch")
+                 if source(name) is ParameterSource.COMMANDLINE]  # fmt: skip
+    return (*given, *pitch_doubts(spec.pitch))
+
+
+def pitch_doubts(pitch: float | None) -> tuple[str, ...]:
+    """Return that a pitch [rad] looks as if its degrees were radians."""
+    if pitch is None:
+        return ()
+    degrees = float(np.degrees(pitch))
+    meant = float(np.degrees(degrees))
+    if not 0.1 < abs(degrees) < 6.3 or abs(meant / _ANGLES - round(meant / _ANGLES)) * _ANGLES > _LIKE_RADIANS:
+        return ()
+    return (f"pitch {degrees:g} is in degrees; {degrees:g} rad would be {meant:.0f}",)
+
+
 def check_picture(picture: str | None) -> None:
     """Refuse a name that the drives' page cannot have, before the work."""
     if picture is not None and not picture.endswith(".png"):
@@ -141,4 +176,6 @@ def outputs(*files: str | None, document: str | None = None, inputs: Iterable[st
         for other in (*files, *read):
             if other is not None and is_picture_of(document, other):
                 raise InputError(f"{other}: the report {document} would write a picture there")
-    return Outputs(*files, document, inputs=read)
+    written = Outputs(*files, document, inputs=read)
+    click.get_current_context().meta[REPLACED] = written.replaced
+    return written

@@ -20,6 +20,8 @@ _BETWEEN = 2  # columns between two cells
 _SHORT = 18
 """Cells of up to this many characters are kept on one line."""
 _LOUD = "boom.stdout"
+REPLACED = "boom.replaced"
+"""Key of the context under which stand the names of files that were there before."""
 
 STYLES = {
     "FAIL": "bold red",
@@ -58,7 +60,9 @@ def print_report(
         print_lines("next", [] if then is None else [then])
     if report.verdict is not Verdict.FAIL:
         return 0
-    complain(report.summary)
+    from planner.reports.answer import answer
+
+    complain(f"{report.verdict}: {answer(report).failed}")
     return ANSWER_IS_NO
 
 
@@ -154,9 +158,11 @@ def _fitting(header: Sequence[str], rows: Sequence[Sequence[str]], drop: Sequenc
         return max(map(len, column))
 
     kept = list(range(len(header)))
-    for name in (None, *drop):
-        if name is not None and name in header:
-            kept.remove(header.index(name))
+    in_turn = [header.index(name) for name in drop if name in header]
+    in_turn += [i for i in reversed(range(1, len(header) - 1)) if i not in in_turn]  # the first and the last column stay
+    for i in (None, *in_turn):
+        if i is not None:
+            kept.remove(i)
         if sum(needed(i) + _BETWEEN for i in kept) - _BETWEEN <= width:
             break
     return kept
@@ -170,9 +176,10 @@ def print_lines(title: str | None, lines: Iterable[str]) -> None:
 
 
 def print_files(written: Mapping[str, str]) -> None:
-    """Print what was written, by kind; a file's name is never folded."""
+    """Print what was written, by kind, and whether it took the place of another file; a name is never folded."""
+    replaced = click.get_current_context().meta.get(REPLACED, ())
     for kind, name in written.items():
-        click.echo(f"{kind}: {name}")
+        click.echo(f"{kind}: {name}{', replaced' if name in replaced else ''}")
 
 
 def print_json(answer: dict[str, Any]) -> None:

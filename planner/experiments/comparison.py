@@ -39,6 +39,8 @@ This is our own choice: one twentieth of the main move.
 """
 
 _ORDER = 3
+_NOTICED = 1e-3  # [s] an offset of the log that is told
+_NOTHING = 1e-9  # [rad, m, Nm, N]
 _EVEN = 0.01  # steps that differ by less than this fraction count as even
 _SHIFTS = 50_000  # largest number of shifts on the grid of the alignment
 _ALIGNMENT_SAMPLES = 20_000  # samples of a log that the final alignment uses
@@ -358,7 +360,15 @@ def compare(
 
 
 POSITION_HEADER = ("joint", "largest error", "at", "RMS", "mean", "noise")
-TORQUE_HEADER = ("joint", "largest difference", "at", "RMS", "noise", "log: largest", "at", "RMS")
+TORQUE_HEADER = ("joint", "largest", "at", "RMS", "noise")
+LOGGED_HEADER = ("joint", "largest", "at", "RMS")
+ANSWER_HEADER = ("joint", "largest error", "at", "RMS", "torque differs", "log differs")
+"""Columns of `answer_cells`: the torque of the measured motion less the plan's, and the log's less the model's."""
+
+
+def answer_cells(joint: dict[str, Any]) -> tuple[str, ...]:
+    """Return a joint of `Comparison.to_json` as table cells under ANSWER_HEADER."""
+    return *position_cells(joint)[:4], torque_cells(joint)[1], logged_cells(joint)[1]
 
 
 def position_cells(joint: dict[str, Any]) -> tuple[str, ...]:
@@ -366,33 +376,48 @@ def position_cells(joint: dict[str, Any]) -> tuple[str, ...]:
     position = joint["position"]
     error = position["error"]
     factor, unit = (1e3, "mm") if position["unit"] == "m" else (180.0 / np.pi, "deg")
-    shown = [f"{value * factor:.4g} {unit}" for value in (error["peak"], error["rms"], error["mean"], position["noise"])]
+    shown = [
+        f"{_above_rounding(value) * factor:.4g} {unit}"
+        for value in (error["peak"], error["rms"], error["mean"], position["noise"])
+    ]
     return joint["joint"], shown[0], f"{error['at_s']:.3f} s", *shown[1:]
 
 
 def torque_cells(joint: dict[str, Any]) -> tuple[str, ...]:
     """Return a joint of `Comparison.to_json` as table cells under TORQUE_HEADER."""
     torque = joint["torque"]
+    return *_torque_cells(joint, "measured_less_planned"), f"{torque['noise']:.3g} {torque['unit']}"
 
-    def shown(found: dict[str, float | None] | None) -> tuple[str, str, str]:
-        if found is None or found["peak"] is None:
-            return "-", "-", "-"
-        return f"{found['peak']:.4g} {torque['unit']}", f"{found['at_s']:.3f} s", f"{found['rms']:.4g} {torque['unit']}"
 
-    noise = f"{torque['noise']:.3g} {torque['unit']}"
-    return joint["joint"], *shown(torque["measured_less_planned"]), noise, *shown(torque["logged_less_measured"])
+def logged_cells(joint: dict[str, Any]) -> tuple[str, ...]:
+    """Return a joint of `Comparison.to_json` as table cells under LOGGED_HEADER."""
+    return _torque_cells(joint, "logged_less_measured")
+
+
+def _torque_cells(joint: dict[str, Any], difference: str) -> tuple[str, ...]:
+    found, unit = joint["torque"][difference], joint["torque"]["unit"]
+    if found is None or found["peak"] is None:
+        return joint["joint"], "-", "-", "-"
+    peak, rms = (f"{_above_rounding(found[name]):.4g} {unit}" for name in ("peak", "rms"))
+    return joint["joint"], peak, f"{found['at_s']:.3f} s", rms
+
+
+def _above_rounding(value: float) -> float:
+    """The value, and 0 where it is nothing but rounding."""
+    return value if abs(value) > _NOTHING else 0.0
 
 
 def summary(answer: dict[str, Any]) -> list[str]:
-    """Return `Comparison.to_json` in sentences: times and offset, and the largest tip error."""
-    tip = answer["tip"]
+    """Return `Comparison.to_json` in sentences: the largest tip error, and the log's offset."""
+    tip, late = answer["tip"], answer["offset_s"] - answer["best_offset_s"]
     where = ", ".join(f"{x:.3f}" for x in tip["planned_m"])
-    return [
-        f"{answer['samples']} samples from {answer['from_s']:.3f} to {answer['to_s']:.3f} s; offset of the log "
-        f"{answer['offset_s']:.4f} s, the offset that fits best is {answer['best_offset_s']:.4f} s",
-        f"tip error: at most {tip['peak_m'] * 1e3:.2f} mm, at {tip['at_s']:.3f} s near the planned point ({where}) m; "
-        f"RMS {tip['rms_m'] * 1e3:.2f} mm",
+    found = [
+        f"tip error at most {tip['peak_m'] * 1e3:.2f} mm, at {tip['at_s']:.3f} s near ({where}) m; "
+        f"RMS {tip['rms_m'] * 1e3:.2f} mm"
     ]
+    if abs(late) > _NOTICED:
+        found.append(f"the log is {abs(late):.4f} s {'late' if late > 0.0 else 'early'}: --offset best takes that out")
+    return found
 
 
 def _curve(planned: Trajectory) -> "CubicHermiteSpline":

@@ -36,6 +36,7 @@ from boom_model.link_design.finite_elements import Solution, solve_beam, solve_p
 from boom_model.link_design.search import pressed
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
 from boom_model.plausible import DEFLECTION, HEIGHT, HEIGHT_STEP, SAFETY_FACTOR, TAPER, THICKNESS
+from boom_model.words import unknown
 from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Verdict
 from planner.links.loads import largest_components, link_cases, thesis_load
@@ -207,6 +208,8 @@ class LinkDesign:
     torques: tuple[Array, Array]
     """Of the link's joint along all motions, with the old link and the new (samples,) [Nm]"""
     motors: tuple[MotorChoice, ...]
+    warnings: tuple[str, ...]
+    """What limits the worth of this very design."""
     notes: tuple[str, ...]
 
     @property
@@ -333,7 +336,8 @@ def design_link(
         trajectories=tuple(trajectories),
         torques=(torques[0], torques[1]),
         motors=tuple(_motors(boom, after, DRIVEN_BY[link.name], trajectories, task.payload_as, catalogue)),
-        notes=tuple(_notes(boom, task, link, beam, cases, trajectories, tapered, float(bent[worst]), found)),
+        warnings=tuple(_warnings(task, beam, cases, tapered, float(bent[worst]), found)),
+        notes=tuple(_notes(boom, task, link, beam, trajectories, found)),
     )
 
 
@@ -402,7 +406,7 @@ def _one_of(name: str, value: str, known: type[E]) -> E:
     try:
         return known(value)
     except ValueError:
-        raise InputError(f"{name} is {value!r}; there are: {', '.join(known)}") from None
+        raise unknown(name, value, known) from None
 
 
 def _torque(boom: Boom, trajectories: Sequence[Trajectory], joint: int, payload_as: PayloadAs) -> Array:
@@ -478,15 +482,38 @@ def _motors(
     return choices
 
 
+def _warnings(
+    task: LinkTask, beam: Beam, cases: LoadCases, tapered: float, bent: float, found: Design | ThesisDesign
+) -> list[str]:
+    """What limits the worth of this very design."""
+    warnings = []
+    if found.heights.max() > beam.length / 5.0:
+        warnings.append(
+            f"the plates are up to {found.heights.max():.3g} m high, more than a fifth of their {beam.length:g} m: "
+            "beam theory does not hold"
+        )
+    if isinstance(found, Design) and found.gap is None:
+        warnings.append("no lower bound within a tenth of the mass is proven: a lighter link may keep these limits")
+    if bent > task.deflection * (1.0 + 1e-4):
+        warnings.append(
+            f"with its own mass and shear it deflects {1e3 * bent:.3f} mm, above its limit; "
+            "the exact method with --shear holds that"
+        )
+    required = task.safety_factor * pressed(cases)
+    if required > 0.0 and tapered < required * (1.0 - 1e-5):
+        warnings.append(
+            f"buckling: the tapered column holds {tapered:.0f} N, below {task.safety_factor:g} times the end load of "
+            f"{pressed(cases):.0f} N"
+        )
+    return warnings
+
+
 def _notes(
     boom: Boom,
     task: LinkTask,
     link: Link,
     beam: Beam,
-    cases: LoadCases,
     trajectories: Sequence[Trajectory],
-    tapered: float,
-    bent: float,
     found: Design | ThesisDesign,
 ) -> list[str]:
     notes = []
@@ -517,25 +544,7 @@ def _notes(
             "the plates' own mass loads the design, that of fittings and cross plates does not: 0.5 kg near the end of the "
             "thesis's inner link adds 2 % to its deflection"
         )
-    if found.heights.max() > beam.length / 5.0:
-        notes.append(
-            f"the plates are up to {found.heights.max():.3g} m high, more than a fifth of their {beam.length:g} m: "
-            "beam theory does not hold"
-        )
-    if isinstance(found, Design) and found.gap is None:
-        notes.append("no lower bound within a tenth of the mass is proven: a lighter link may keep these limits")
     notes.append("lateral bending and torsion, fatigue, welds, pin holes and local buckling of a plate's edge are not checked")
-    if bent > task.deflection * (1.0 + 1e-4):
-        notes.append(
-            f"with its own mass and shear it deflects {1e3 * bent:.3f} mm, above its limit; "
-            "the exact method with --shear holds that"
-        )
-    required = task.safety_factor * pressed(cases)
-    if required > 0.0 and tapered < required * (1.0 - 1e-5):
-        notes.append(
-            f"buckling: the tapered column holds {tapered:.0f} N, below {task.safety_factor:g} times the end load of "
-            f"{pressed(cases):.0f} N"
-        )
     if isinstance(found, ThesisDesign):
         notes.append("the thesis's method freezes the moments of its first stage and leaves out shear")
     return notes

@@ -88,7 +88,7 @@ def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:
             }
             for m in design.motors
         ],
-        "notes": list(design.notes),
+        "notes": [*design.warnings, *design.notes],
         "files": files,
     }
 
@@ -222,7 +222,7 @@ def to_markdown(design: LinkDesign) -> str:
         if body:
             lines += [*table(header, body), ""]
     assumed = assumptions(design.before, any(motion.qddd is not None for motion in design.trajectories))
-    return "\n".join([*lines[:-1], *section("Notes", design.notes), *section("Assumed", assumed)]) + "\n"
+    return "\n".join([*lines[:-1], *section("Notes", (*design.warnings, *design.notes)), *section("Assumed", assumed)]) + "\n"
 
 
 def title(design: LinkDesign) -> str:

@@ -24,6 +24,7 @@ from planner.motion.trajectory import (
     trajectory_of,
     write_csv,
 )
+from planner.motion.units import require_si
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -90,12 +91,15 @@ def read_quantities(path: str | Path, *, with_torques: bool = True) -> tuple[dic
         with_torques: whether to read tau.
 
     Raises:
-        InputError: as `read_motion`.
+        InputError: as `read_motion`, or the numbers look like another unit (`require_si`).
     """
-    if Path(path).suffix.lower() != ".parquet":
-        return quantities(path, csv_table(path), with_torques=with_torques), ()
-    table, notes = _parquet_table(path)
-    return quantities(path, table, first="row 1", with_torques=with_torques), notes
+    if Path(path).suffix.lower() == ".parquet":
+        table, notes = _parquet_table(path)
+        data = quantities(path, table, first="row 1", with_torques=with_torques)
+    else:
+        data, notes = quantities(path, csv_table(path), with_torques=with_torques), ()
+    require_si(path, data)
+    return data, notes
 
 
 # Parquet

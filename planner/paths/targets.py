@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from boom_model import Boom, Constraint, InfeasibleError, InputError, inverse_kinematics, nearest_reachable
 from boom_model.arrays import Array, checked
-from boom_model.words import joint_position, number, numbers
+from boom_model.words import joint_position, number, numbers, unknown
 
 PITCHES = {"down": -np.pi / 2.0, "level": 0.0, "up": np.pi / 2.0}
 
@@ -67,7 +67,7 @@ def parse_along(text: str) -> str | Array:
         return text
     kind, _, rest = text.partition("=")
     if kind != "arc":
-        raise InputError(f"along {text!r} is not known; there are: joint, line, arc=X,Y,Z")
+        raise unknown("along", text, ("joint", "line", "arc=X,Y,Z"))
     return np.array(numbers(text, rest, 3))
 
 

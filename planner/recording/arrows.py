@@ -113,5 +113,5 @@ def _arrows(boom: Boom, q: Array, loads: Loads, part: slice, scale: Scale) -> It
 
 
 def _log_style(recording: rr.RecordingStream, name: str, label: str, color: Color) -> None:
-    style = rr.Arrows3D.from_fields(colors=[color], radii=[0.02], labels=[label], show_labels=True)
+    style = rr.Arrows3D.from_fields(colors=[color], radii=[0.007], labels=[label], show_labels=True)
     recording.log(f"world/loads/{name}", style, rr.CoordinateFrame("mount"), static=True)

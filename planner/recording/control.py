@@ -48,10 +48,10 @@ def write_control_recording(path: str | Path, study: Study, *, step: float = 0.0
     pictures = {"errors": png(error_figure(study))} | ({"loops": png(loop_figure(study))} if study.designs else {})
 
     def log(recording: rr.RecordingStream) -> None:
-        grids = [rrb.Grid(*(bundle.view for bundle in tab), grid_columns=3, name=name) for name, tab in tabs.items()]
         images = [rrb.Spatial2DView(origin=f"/pictures/{name}", name=name) for name in pictures]
         errors_tab = rrb.Vertical(*(bundle.view for bundle in errors), name="Tip error")
-        right = rrb.Tabs(errors_tab, *images, text("report", "Report"), *grids, active_tab=0)
+        pages = rrb.Tabs(*images, active_tab=0, name="Pictures")
+        right = rrb.Tabs(text("report", "Answer"), errors_tab, _cases(study, tabs), pages, active_tab=0)
         tip = forward_kinematics(boom, q).position
         view = scene(f"Boom [m], {names[0]}", eye_of(boom, q), ground_level(boom, tip))
         recording.send_blueprint(shown_beside(view, right, [1, 2]))
@@ -67,6 +67,16 @@ def write_control_recording(path: str | Path, study: Study, *, step: float = 0.0
             log_png(recording, f"pictures/{name}", content)
 
     save(path, f"{boom.name}: closed loop", log)
+
+
+def _cases(study: Study, tabs: dict[str, list[Bundle]]) -> rrb.Tabs:
+    """Return a tab of tabs: a profile, then one of its controllers and shapers."""
+    by_profile: dict[str, list[rrb.View | rrb.Container]] = {}
+    for row, tab in zip(study.rows, tabs.values(), strict=True):
+        name = str(row.controller) if len({each.shaper for each in study.rows}) == 1 else f"{row.controller}, {row.shaper}"
+        by_profile.setdefault(row.profile, []).append(rrb.Grid(*(each.view for each in tab), grid_columns=3, name=name))
+    profiles = [rrb.Tabs(*grids, active_tab=0, name=profile) for profile, grids in by_profile.items()]
+    return rrb.Tabs(*profiles, active_tab=0, name="Cases")
 
 
 def _tip_errors(study: Study, every: slice) -> list[Bundle]:

@@ -1,13 +1,36 @@
-"""Checks and assumptions of a report as Markdown documents."""
+"""Answer, checks and assumptions of a report as Markdown documents."""
 
 from boom_model import Boom
 from planner.checks.rows import Verdict
 from planner.recording.arrows import ARROWS_NOTE
 from planner.recording.scene import SURROUNDINGS_NOTE
+from planner.reports.answer import JOINT_HEADER, answer
 from planner.reports.markdown import section, table
 from planner.reports.report import Report, cells
 
 CHECK_HEADER = ("verdict", "joint", "check", "demand", "limit", "margin", "required", "at", "basis")
+
+
+def answer_markdown(boom: Boom, report: Report) -> str:
+    """Return the lines that the command prints first: verdict, table of joints, findings, possible fixes."""
+    first = answer(report)
+    listed = [*first.findings, *(f"possible fix: {each}" for each in report.suggestions)]
+    counted = f"{first.assumed} assumed figures, {len(report.rows)} checks: see the tab Assumptions."
+    return "\n".join(
+        [
+            f"# {first.verdict}",
+            "",
+            f"{report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg",
+            "",
+            first.sentence.partition(": ")[2],
+            "",
+            *table(JOINT_HEADER, first.joints),
+            "",
+            *(f"- {each}" for each in listed),
+            "",
+            counted,
+        ]
+    )
 
 
 def checks_markdown(report: Report) -> str:

@@ -40,7 +40,7 @@ def position_plots(boom: Boom, trajectory: Trajectory) -> list[Plot]:
         "deg",
         COLORS["upper"],
         np.degrees(trajectory.q[:, 2] - trajectory.q[:, 1]),
-        {"lower limit": float(np.degrees(limits.linkage))},
+        {"minimum": float(np.degrees(limits.linkage))},
         limits.origins["linkage"][0].basis,
     )
     return [*_joint_plots(boom, "q", "position", "", trajectory.q, limits.lower, limits.upper), linkage]
@@ -68,7 +68,7 @@ def _joint_plots(boom: Boom, quantity: str, name: str, per: str, values: Array, 
             f"{'m' if IS_LENGTH[i] else 'deg'}{per}",
             JOINT_COLORS[joint],
             for_people(i, values[:, i]),
-            {"lower limit": float(low), "upper limit": float(high)},
+            {"minimum": float(low), "maximum": float(high)},
             boom.limits.origins[name][i].basis,
         )
 
@@ -85,10 +85,12 @@ def torque_plots(boom: Boom, trajectory: Trajectory, tau: Array) -> Iterator[Plo
         limits: dict[str, float | Array] = {}
         if drive is not None and limit is not None:
             own = drive_inertia(drive) * trajectory.qdd[:, i]
-            limits = {"lower drive limit": -limit - own, "upper drive limit": limit - own}
+            limits = {"drive minimum": -limit - own, "drive maximum": limit - own}
         basis = Basis.weakest([Basis.ESTIMATED, *([] if drive is None else [o.basis for o in drive.supply_origins])])
         name = "force" if IS_LENGTH[i] else "torque"
-        yield Plot(f"plots/tau/{joint}", f"{joint} {name}", LOAD_UNITS[i], JOINT_COLORS[joint], tau[:, i], limits, basis)
+        why = "" if limits else "no drive limits it"
+        unit, color = LOAD_UNITS[i], JOINT_COLORS[joint]
+        yield Plot(f"plots/tau/{joint}", f"{joint} {name}", unit, color, tau[:, i], limits, basis, why)
 
 
 def ratio_bundles(ratios: dict[str, Array]) -> list[Bundle]:

@@ -1,5 +1,6 @@
 """Recording of a move: the 3D scene with all its plots and documents."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import rerun as rr
@@ -10,16 +11,19 @@ from boom_model.kinematics.reach import ReachMap
 from planner.planning import Move
 from planner.recording import drive_plots, joint_plots
 from planner.recording.arrows import arrow_scale, log_arrows
-from planner.recording.documents import assumptions_markdown, checks_markdown
+from planner.recording.documents import answer_markdown, assumptions_markdown, checks_markdown
 from planner.recording.layout import eye_of, grid, scene, shown_beside, text
 from planner.recording.legend import legend_view, log_legend
 from planner.recording.plots import Bundle, Plot
 from planner.recording.reach import boundary_sentence, log_boundary
-from planner.recording.scene import ground_level, log_motion, log_mount, log_solids, log_surroundings
-from planner.recording.stream import log_markdown, log_png, save
+from planner.recording.scene import ground_level, log_height, log_motion, log_mount, log_solids, log_surroundings
+from planner.recording.states import events_view, lanes, log_events, log_lanes, states_view
+from planner.recording.stream import log_markdown, log_png, log_properties, save
 from planner.recording.torque_ratio import legend, log_tip_path, torque_ratios, worst_ratio
 from planner.recording.torque_speed import log_plane, planes
 from planner.reports.drive_pictures import drive_picture
+
+_TEXTS = ("assumptions", "checks", "report")
 
 
 def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = None) -> None:
@@ -55,7 +59,11 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
     /plane/<joint>            torque-speed plane of the motor, with the operating point over time in
                               .../now
     /drives                   the page of `drive_picture`, if a joint has a motor
-    /checks, /assumptions, /report   documents in Markdown
+    /states/phase, limit, brakes     what the move is doing, as lanes over time
+    /events                          entries where a limit is met, and of the worst stops
+    /answer, /checks, /assumptions, /report   documents in Markdown
+
+    The recording's properties hold verdict, profile, duration, payload, command and versions.
 
     Args:
         path: the .rrd file.
@@ -91,15 +99,15 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
         drive_tabs.insert(0, rrb.Vertical(*(plane.view for plane in motors), name="Torque-speed"))
     if driven:
         drive_tabs.append(rrb.Spatial2DView(origin="/drives", name="Page"))
+    moving: dict[str, Sequence[Plot | Bundle]] = {**joints, "Torque parts": parts, "Pins and mount": forces}
     tabs: list[rrb.View | rrb.Container] = [
+        rrb.Vertical(text("answer", "Answer"), states_view(), events_view(), row_shares=[5, 2, 2], name="Answer"),
         grid("Torques", torques),
-        rrb.Tabs(*(grid(name, tab) for name, tab in joints.items()), active_tab=0, name="Joints"),
-        grid("Torque parts", parts),
-        *([grid("Pins and mount", forces)] if forces else []),
+        rrb.Tabs(*(grid(name, tab) for name, tab in moving.items() if tab), active_tab=0, name="Motion"),
         *([rrb.Tabs(*drive_tabs, active_tab=0, name="Drives")] if drive_tabs else []),
-        text("checks", "Checks"),
-        text("assumptions", "Assumptions"),
-        text("report", "Report"),
+        rrb.Tabs(
+            *(text(each, each.capitalize()) for each in ("assumptions", "checks", "report")), active_tab=0, name="Assumptions"
+        ),
     ]
     left = rrb.Vertical(
         scene(
@@ -113,12 +121,17 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
 
     def log(recording: rr.RecordingStream) -> None:
         recording.send_blueprint(shown_beside(left, rrb.Tabs(*tabs, active_tab=0), [1, 1]))
+        log_properties(recording, boom, report)
+        log_markdown(recording, "answer", answer_markdown(boom, report))
         log_markdown(recording, "report", report.to_markdown())
         log_markdown(recording, "checks", checks_markdown(report))
         log_markdown(recording, "assumptions", assumptions_markdown(boom, report))
         log_mount(recording, trajectory.t, move.vehicle)
+        log_lanes(recording, trajectory.t, lanes(move))
+        log_events(recording, move)
         log_solids(recording, boom)
         log_motion(recording, boom, trajectory.t, trajectory.q)
+        log_height(recording, boom, trajectory.t, tip)
         log_surroundings(recording, boom, tip)
         log_tip_path(recording, tip, worst)
         log_legend(recording, bands)

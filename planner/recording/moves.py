@@ -59,12 +59,11 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
     ratios = {name: np.minimum(ratio, MOST_RATIO) for name, ratio in known.items() if ratio is not None}
 
     def log(recording: rr.RecordingStream) -> None:
-        tabs: list[rrb.View | rrb.Container] = [_grid(name, tab) for name, tab in shared.items()]
         title = f"largest torque / limit of all drives, up to {MOST_RATIO:g} [-]"
         ratio = rrb.TimeSeriesView(origin="/plots/ratio", name=title)
-        if ratios:
-            tabs.insert(0, rrb.Vertical(ratio, name="Torque / limit"))
-        right = rrb.Tabs(*tabs, text("reading", "Reading"), active_tab=0)
+        torques, *others = (_grid(name, tab) for name, tab in shared.items())
+        driven = rrb.Vertical(ratio, torques, row_shares=[1, 3], name="Torques") if ratios else torques
+        right = rrb.Tabs(text("reading", "Answer"), driven, rrb.Tabs(*others, active_tab=0, name="Motion"), active_tab=0)
         view = scene(
             "Booms [m]",
             eye_of(longest.boom, *(move.trajectory.q for move in moves.values())),

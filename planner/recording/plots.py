@@ -30,11 +30,18 @@ class Plot:
     """
     basis: Basis
     """Basis of the limits."""
+    without: str = ""
+    """Why no limit is shown."""
 
     @property
     def title(self) -> str:
         """Name and unit of the quantity."""
         return f"{self.name} [{self.unit}]"
+
+    @property
+    def view_title(self) -> str:
+        """The title, and why no limit is shown."""
+        return f"{self.title}, {self.without}" if self.without else self.title
 
     @property
     def limit_titles(self) -> list[str]:
@@ -62,7 +69,7 @@ class Plot:
         """View of the curve, with the legend in the corner that the curve leaves free."""
         first, second = self.values[: len(self.values) // 2 + 1], self.values[len(self.values) // 2 :]
         corner = rrb.Corner2D.LeftBottom if first.min() > second.min() else rrb.Corner2D.RightBottom
-        return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.title, plot_legend=corner)
+        return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.view_title, plot_legend=corner)
 
 
 @dataclass(frozen=True, eq=False)

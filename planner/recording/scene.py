@@ -12,7 +12,7 @@ from boom_model.arrays import Array
 from boom_model.keep_out import Box, KeepOut
 from boom_model.kinematics.frames import R_LINK_BODY
 from planner.motion.vehicle import VehicleCase, base_pose
-from planner.recording.palette import COLORS, DARK, GREY, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, PIN_COLOR, Color
+from planner.recording.palette import COLORS, DARK, LIGHT, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, PIN_COLOR, Color
 from planner.recording.stream import time_column
 
 POSES_AT_ONCE = 20_000
@@ -21,10 +21,14 @@ POSES_AT_ONCE = 20_000
 A sample takes about 3 kB in memory and 0.5 kB in the file.
 """
 
-SURROUNDINGS_NOTE = "Ground and vehicle are drawn for display only, because the boom file does not define them."
+SURROUNDINGS_NOTE = "Ground, vehicle and plot are drawn for display only, because the boom file does not define them."
 
 _STEEL = 7850.0  # [kg/m^3]: the payload is drawn as a steel ball
 _GROUND, _BELOW_TIP = 1.0, 0.25  # [m]
+_PLOT = (0.6, 1.8)  # [m] half the size of a plot of 1.2 by 3.6 m
+_SOIL: Color = (96, 84, 56)
+_METAL: Color = (92, 96, 102)
+_HEIGHTS = 500
 
 
 @dataclass(frozen=True)
@@ -141,12 +145,45 @@ def log_surroundings(recording: rr.RecordingStream, boom: Boom, tip: Array) -> N
         labels=[f"ground, {label}"], show_labels=False,
     )  # fmt: skip
     recording.log("world/ground", plane, static=True)
-    low, high = np.array([-2.4, -0.8, ground + 0.35]), np.array([0.25, 0.8, -0.02])
+    _log_vehicle(recording, ground, label)
+    end = tip[-1]
+    plot = rr.Boxes3D(
+        centers=[(end[0], end[1], ground + 0.005)], half_sizes=[(*_PLOT, 0.005)], colors=[_SOIL], fill_mode="solid",
+        labels=[f"breeder plot, {label}"], show_labels=False,
+    )  # fmt: skip
+    recording.log("world/plot", plot, static=True)
+
+
+def log_height(recording: rr.RecordingStream, boom: Boom, t: Array, tip: Array) -> None:
+    """Log a plumb line from the tip (n, 3) to the ground over time, with its length.
+
+    Nothing is logged for a boom with keep-out shapes, whose ground is not known.
+    """
+    if boom.keep_out is not None:
+        return
+    ground, some = ground_level(boom, tip), slice(None, None, max(1, len(t) // _HEIGHTS))
+    shown = tip[some]
+    lines = np.stack([shown, np.where([False, False, True], ground, shown)], axis=1)
+    style = rr.LineStrips3D.from_fields(colors=[LIGHT], radii=[0.004], show_labels=True)
+    recording.log("world/height", style, rr.CoordinateFrame("mount"), static=True)
+    labels = [f"{height:.2f} m above ground" for height in shown[:, 2] - ground]
+    columns = rr.LineStrips3D.columns(strips=list(lines), labels=labels)
+    recording.send_columns("world/height", [time_column(t[some])], columns)
+
+
+def _log_vehicle(recording: rr.RecordingStream, ground: float, label: str) -> None:
+    """Log a vehicle on wheels behind the mount."""
+    low, high = np.array([-2.4, -0.8, ground + 0.55]), np.array([0.25, 0.8, -0.02])
     body = rr.Boxes3D(
-        centers=[(low + high) / 2.0], half_sizes=[(high - low) / 2.0], colors=[GREY], fill_mode="majorwireframe",
-        labels=[f"vehicle, {label}"], show_labels=True,
+        centers=[(low + high) / 2.0], half_sizes=[(high - low) / 2.0], colors=[_METAL], fill_mode="solid",
+        labels=[f"vehicle, {label}"], show_labels=False,
     )  # fmt: skip
     recording.log("world/vehicle", body, rr.CoordinateFrame("mount"), static=True)
+    radius = 0.5
+    at = [(x, y, ground + radius) for x in (low[0] + radius, high[0] - radius) for y in (low[1], high[1])]
+    along = Rotation.from_euler("x", 90.0, degrees=True).as_quat()
+    wheels = rr.Cylinders3D(centers=at, lengths=0.3, radii=radius, quaternions=[along] * 4, colors=PIN_COLOR, fill_mode="solid")
+    recording.log("world/vehicle/wheels", wheels, rr.CoordinateFrame("mount"), static=True)
 
 
 def _log_keep_out(recording: rr.RecordingStream, keep_out: KeepOut) -> None:

@@ -1,14 +1,23 @@
 """Writing logged entities to a file."""
 
+import shlex
+import sys
 import uuid
 from collections.abc import Callable
+from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
 
+from boom_model import Boom
 from boom_model.arrays import Array
 from planner.files import replacing
+from planner.reports.report import Report
+
+_COMMANDS = ("boom", "__main__.py")
+_VERSIONS = ("boom", "numpy", "rerun-sdk", "ruckig", "toppra")
 
 
 def save(path: str | Path, name: str, log: Callable[[rr.RecordingStream], None]) -> None:
@@ -34,6 +43,20 @@ def log_markdown(recording: rr.RecordingStream, entity: str, text: str) -> None:
 def log_png(recording: rr.RecordingStream, entity: str, png: bytes) -> None:
     """Log a static picture."""
     recording.log(entity, rr.EncodedImage(contents=png, media_type="image/png"), static=True)
+
+
+def log_properties(recording: rr.RecordingStream, boom: Boom, report: Report) -> None:
+    """Log what was asked and found as properties of the recording, with the command and the versions."""
+    found: dict[str, Any] = {
+        "verdict": str(report.verdict),
+        "profile": report.profile,
+        "duration_s": report.duration,
+        "payload_kg": boom.payload.mass,
+        "boom": boom.name,
+        "command": shlex.join(["boom", *sys.argv[1:]]) if Path(sys.argv[0]).name in _COMMANDS else "from Python",
+        "versions": ", ".join(f"{name} {metadata.version(name)}" for name in _VERSIONS),
+    }
+    recording.send_property("boom", rr.AnyValues(**found))
 
 
 def _encoded(name: str, log: Callable[[rr.RecordingStream], None]) -> bytes:

@@ -24,6 +24,8 @@ class Answer:
     verdict: Verdict
     sentence: str
     """The verdict in words."""
+    failed: str
+    """What fails, in words; empty where nothing does."""
     joints: tuple[tuple[str, ...], ...]
     """A row for each joint, the mount and the tip, under JOINT_HEADER."""
     findings: tuple[str, ...]
@@ -34,9 +36,11 @@ class Answer:
 
 def answer(report: Report) -> Answer:
     """Return the first lines of a report."""
+    failed = _failed(report)
     return Answer(
         verdict=report.verdict,
-        sentence=f"{report.verdict}: {_in_words(report)}",
+        sentence=f"{report.verdict}: {failed or '; '.join(['nothing fails', *_open(report)])}",
+        failed=failed,
         joints=joint_table(report),
         findings=tuple(_findings(report)),
         assumed=len(report.assumptions),
@@ -103,11 +107,16 @@ def _joint_verdict(rows: Sequence[Row]) -> str:
     return ("WARN" if Verdict.WARN in verdicts else "PASS") + (f", {unknown} open" if unknown else "")
 
 
-def _in_words(report: Report) -> str:
+def _failed(report: Report) -> str:
     failed = [f"{row.joint} {row.check}" for row in report.rows if row.verdict is Verdict.FAIL]
     if report.certificate is not None:
         failed += [f"{worst.joint} {worst.limit} (certificate)" for worst in report.certificate.broken]
-    parts = [f"fails: {_listed(dict.fromkeys(failed))}" if failed else "nothing fails"]
+    return _listed(dict.fromkeys(failed)) if failed else ""
+
+
+def _open(report: Report) -> list[str]:
+    """Return what is not known, in words."""
+    parts = []
     undriven = list(dict.fromkeys(row.joint for row in report.rows if row.kind.part is Part.UNKNOWN_DRIVE))
     if undriven:
         parts.append(f"{_listed(undriven)} {'has' if len(undriven) == 1 else 'have'} no drive to check")
@@ -117,7 +126,7 @@ def _in_words(report: Report) -> str:
         parts.append(f"datasheets leave checks of {_listed(sheet)} open")
     if any(row.joint == "mount" for row in open_rows):
         parts.append("the mount has no limit")
-    return "; ".join(parts)
+    return parts
 
 
 def _findings(report: Report) -> Iterable[str]:

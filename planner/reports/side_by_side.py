@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from boom_model import JOINTS, InputError
+from boom_model import JOINTS
+from boom_model.words import unknown
 from planner.checks.kinds import DRIVE_PARTS
 from planner.checks.rows import Row
 from planner.reports.answer import joint_table
@@ -24,7 +25,7 @@ def compared(reports: Mapping[str, Report], joints: Sequence[str]) -> tuple[tupl
     """
     for joint in joints:
         if joint not in (*JOINTS, *_NOT_JOINTS):
-            raise InputError(f"unknown joint {joint!r}; there are: {', '.join((*JOINTS, *_NOT_JOINTS))}")
+            raise unknown("joint", joint, (*JOINTS, *_NOT_JOINTS))
     by_check: dict[tuple[str, str], dict[str, Row]] = {}
     for name, report in reports.items():
         for row in report.rows:

@@ -23,6 +23,7 @@ from boom_model import (
 from boom_model.arrays import scalar
 from boom_model.boom import IS_LENGTH
 from boom_model.dynamics.newton_euler import PayloadAs
+from boom_model.words import unknown
 from planner.bisection import bisect
 from planner.checks.drives.joint_view import JointView
 from planner.checks.evaluation import at_samples
@@ -345,7 +346,7 @@ def parse_variant(boom: Boom, text: str) -> Boom:
 
 def _index(joint: str) -> int:
     if joint not in JOINTS:
-        raise InputError(f"unknown joint {joint!r}; there are: {', '.join(JOINTS)}")
+        raise unknown("joint", joint, JOINTS)
     return JOINTS.index(joint)
 
 

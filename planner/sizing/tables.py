@@ -105,6 +105,45 @@ def saving(choices: Sequence[Choice]) -> list[tuple[str, ...]]:
     return rows
 
 
+ANSWER = ("boom", "joint", "fitted", "lightest that does not fail", "mass", "saves", "verdict")
+"""Columns of `answer_rows`."""
+
+
+def answer_rows(choices: Sequence[Choice]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of what to fit: one row per joint, with the boom's name if there are several."""
+    rows = []
+    for choice in choices:
+        best, fitted = choice.lightest, choice.fitted
+        mass = "-" if best is None or best.mass is None else f"{best.mass:.1f} kg"
+        saves = "-" if choice.saves is None else f"{choice.saves:.1f} kg"
+        verdict = "none does" if choice.judged else "none to try"
+        if best is not None:
+            verdict = f"{len(best.unknown)} open" if best.unknown else "PASS"
+        names = ("none" if each is None else each.name.replace(" + ", "+") for each in (fitted, best))
+        rows.append((choice.variant, choice.joint, *names, mass, saves, verdict))
+    several = len({row[0] for row in rows}) > 1
+    return (ANSWER, rows) if several else (ANSWER[1:], [row[1:] for row in rows])
+
+
+def conclusion(choices: Sequence[Choice]) -> tuple[str, ...]:
+    """Return what the choice comes to, in a sentence for each boom."""
+    sentences = []
+    for variant, group in groupby(choices, key=lambda choice: choice.variant):
+        parts = list(group)
+        spared = [choice for choice in parts if choice.saves]
+        none = [choice.joint for choice in parts if choice.lightest is None]
+        said = []
+        if spared:
+            total = sum(choice.saves or 0.0 for choice in spared)
+            said.append(f"{total:.1f} kg can be saved on {', '.join(choice.joint for choice in spared)}")
+        elif any(choice.fitted is not None for choice in parts):
+            said.append("no lighter drive does")
+        if none:
+            said.append(f"the catalogue has no drive that does for {', '.join(none)}")
+        sentences.append(f"{variant}: {'; '.join(said) or 'each joint has a drive that does'}")
+    return tuple(sentences)
+
+
 def unknown_checks(choices: Sequence[Choice]) -> tuple[str, ...]:
     """Return the checks for which no drive has data."""
     return tuple(dict.fromkeys(check for choice in choices for judged in choice.judged for check in judged.unknown))

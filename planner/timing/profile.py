@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from boom_model import BaseMotion, Boom, InputError
 from boom_model.arrays import Array, checked, read_only
+from boom_model.words import unknown
 from planner.paths.clearance import require_path_clear
 from planner.paths.path import Path, SplinePath
 from planner.timing.time_law import Motion, TimeLaw
@@ -208,7 +209,7 @@ def parse_profile(
     """
     kind = PROFILES.get(word)
     if kind is None:
-        raise InputError(f"profile is {str(word)!r}; there are: {', '.join(PROFILES)}")
+        raise unknown("profile", word, PROFILES)
     for name, given in (("jerk_bound", jerk_bound), ("average_torque", average_torque)):
         if given and kind is not TimeOptimal:
             raise InputError(f"{name} is for the time-optimal profile, not for {word}")

@@ -10,7 +10,7 @@ the tables are replaced by the corrected value, and the note of the row says so.
 """
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from importlib.resources import files
 
@@ -60,6 +60,25 @@ class ValidationRow:
     def ok(self) -> bool:
         """Whether the two values agree within the tolerance."""
         return bool(abs(self.actual - self.expected) <= self.tolerance)
+
+
+ROW_HEADER = ("table", "row", "quantity", "expected", "actual", "tolerance", "ok", "note")
+
+
+def row_cells(row: ValidationRow) -> tuple[str, ...]:
+    """Return a row as table cells under ROW_HEADER."""
+    numbers = (f"{row.expected:.6g}", f"{row.actual:.5f}", f"{row.tolerance:.1g}")
+    return row.table, row.row, row.quantity, *numbers, "OK" if row.ok else "FAIL", row.note
+
+
+def by_table(rows: Sequence[ValidationRow]) -> list[tuple[str, str, str, str]]:
+    """Return for each table: name, number of values, how many hold, and the largest difference / tolerance."""
+    found = []
+    for table in dict.fromkeys(row.table for row in rows):
+        own = [row for row in rows if row.table == table]
+        used = max(abs(row.actual - row.expected) / row.tolerance for row in own)
+        found.append((table, f"{len(own)}", f"{sum(row.ok for row in own)}", f"{used:.2f}"))
+    return found
 
 
 def validate(boom: Boom) -> tuple[ValidationRow, ...]:

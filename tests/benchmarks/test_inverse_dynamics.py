@@ -17,7 +17,7 @@ import pytest
 from boom_model.arrays import Array
 from boom_model.boom import Boom
 from boom_model.dynamics.newton_euler import Loads, inverse_dynamics
-from tests.oracles import mujoco_model, pinocchio_model, random_base, random_states, tree_matrix
+from tests.oracles import fixed_root, mujoco_model, pinocchio_model, random_base, random_states, tree_matrix
 
 BOOM = Boom.load()
 COUNTS = (1, 1_000, 100_000)
@@ -198,13 +198,3 @@ def assert_same(tau: Array, *states: Array) -> None:
     scale = np.abs(inverse_dynamics(BOOM, *some_states(1_000)).tau).max(axis=0)
     assert tau.shape == expected.shape
     assert (np.abs(tau - expected) < 1e-9 * scale).all()
-
-
-def fixed_root(free: pinocchio.Model) -> pinocchio.Model:
-    """The same tree without the free-flyer at its root."""
-    model = pinocchio.Model()
-    model.gravity = free.gravity
-    for joint in range(2, free.njoints):
-        model.addJoint(free.parents[joint] - 1, free.joints[joint], free.jointPlacements[joint], free.names[joint])
-        model.appendBodyToJoint(joint - 1, free.inertias[joint], pinocchio.SE3.Identity())
-    return model

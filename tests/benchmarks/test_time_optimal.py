@@ -29,9 +29,8 @@ from planner.paths.path import JointLine
 from planner.timing.profiles.time_optimal import GRID_INTERVALS, time_optimal
 from planner.timing.time_law import Motion
 from planner.timing.timing import Timing, timed
-from tests.benchmarks.test_inverse_dynamics import fixed_root
 from tests.minimum_time import AT_STANDSTILL, DRIVEN, INERTIA, throughout, worst_ratios
-from tests.oracles import pinocchio_model, tree_matrix
+from tests.oracles import fixed_root, pinocchio_model, tree_matrix
 
 BOOM = Boom.load()
 PATH = JointLine(BOOM.pose("transport"), BOOM.pose("phenotyping"))

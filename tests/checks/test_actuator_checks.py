@@ -9,27 +9,13 @@ from boom_model import Basis, Boom, LinearActuator, LinearDrive, Origin, Sourced
 from planner import Trajectory, Verdict, check
 from planner.checks.drives.actuator import actuator_rows
 from planner.checks.drives.duty import Duty
-from tests.checks.test_drive_checks import row, view
+from tests.builders import SCREW, joint_view, row
 
 SHEET = Origin(Basis.PRINTED, "this test")
-SCREW = LinearActuator(
-    name="SCREW",
-    source="this test",
-    rated_force=500.0,
-    peak_force=800.0,
-    static_force=900.0,
-    max_speed=0.35,
-    stroke=1.0,
-    lead=0.010,
-    efficiency=0.8,
-    backdrive_force=100.0,
-    duty=0.25,
-    mass=4.0,
-)
 
 
 def rows_of(force, speed, actuator=SCREW, brake=None, **kwargs):
-    return list(actuator_rows(view(tau=force, qd=speed, **kwargs), LinearDrive(actuator, brake), 0.0))
+    return list(actuator_rows(joint_view(tau=force, qd=speed, **kwargs), LinearDrive(actuator, brake), 0.0))
 
 
 def test_screw_torque_by_hand():

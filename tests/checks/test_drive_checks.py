@@ -10,9 +10,10 @@ from boom_model.drives.drive import motor_torque
 from planner import Trajectory, Verdict, check
 from planner.checks.drives.duty import Duty
 from planner.checks.drives.gearbox import gearbox_rows
-from planner.checks.drives.joint_view import JointView, Shock
+from planner.checks.drives.joint_view import Shock
 from planner.checks.drives.motor import full_step_resonance, longest_dwell, motor_rows
 from planner.checks.motion_checks import drive_rows
+from tests.builders import joint_view, row
 
 BOOM = Boom.load()
 DRIVE = BOOM.drives[1]  # MST342C02 on CBG320160, at 80 V in parallel
@@ -21,33 +22,6 @@ RPM = 2 * np.pi / 60
 MINE = Origin(Basis.PRINTED, "this test")
 RATED = replace(DRIVE, gearbox=replace(GEAR, rated_life=35_000 * 3600.0, rated_input_speed=2000 * RPM))
 RANKS = (Verdict.PASS, Verdict.WARN, Verdict.FAIL)
-
-
-def view(tau=0.0, qd=0.0, qdd=0.0, inertia=1.0, t=None, duty=None, static=None, coulomb=0.0) -> JointView:
-    """Joint 2 of a motion whose torque, speed and acceleration are given sample by sample, or constant."""
-    t = np.array([0.0, 1.0]) if t is None else np.asarray(t, dtype=float)
-    tau, qd, qdd = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (tau, qd, qdd))
-    rates = np.zeros((2, t.size, 5))
-    rates[0, :, 1], rates[1, :, 1] = qd, qdd
-    return JointView(
-        joint="inner",
-        is_length=False,
-        trajectory=Trajectory.from_samples(t, np.zeros((t.size, 5)), *rates),
-        duty=Duty.alone(t) if duty is None else duty,
-        tau=tau,
-        tau_without_shock=tau,
-        friction=np.zeros(t.size),
-        coulomb=coulomb,
-        static=tau if static is None else np.broadcast_to(np.asarray(static, dtype=float), t.shape),
-        inertia=np.array([inertia]),
-        index=1,
-        basis=Basis.PRINTED,
-        steady=True,
-    )
-
-
-def row(rows, check_name):
-    return next(r for r in rows if r.check == check_name)
 
 
 # The gearbox
@@ -62,7 +36,7 @@ def row(rows, check_name):
     ],
 )
 def test_life_by_hand(tau, rpm, hours):
-    motion = view(tau=tau, qd=rpm * RPM / 160)
+    motion = joint_view(tau=tau, qd=rpm * RPM / 160)
     known = row(gearbox_rows(motion, RATED, None), "gearbox life")
     assert known.limit == pytest.approx(hours * 3600, rel=1e-12)
     assert known.verdict is Verdict.INFO  # nobody asks for a life
@@ -74,7 +48,7 @@ def test_life_by_hand(tau, rpm, hours):
 
 @pytest.mark.parametrize(("hours", "verdict"), [(6900.0, Verdict.PASS), (7100.0, Verdict.FAIL)])
 def test_life_against_what_is_asked(hours, verdict):
-    motion = view(tau=172.0, qd=2000 * RPM / 160)
+    motion = joint_view(tau=172.0, qd=2000 * RPM / 160)
     asked = replace(motion, duty=replace(motion.duty, required_life=Sourced(hours * 3600.0, MINE)))
     found = row(gearbox_rows(asked, RATED, None), "gearbox life")
     assert (found.demand, found.verdict) == (hours * 3600.0, verdict)
@@ -82,7 +56,7 @@ def test_life_against_what_is_asked(hours, verdict):
 
 
 def test_a_joint_that_rests_has_no_life_to_use_up():
-    assert "gearbox life" not in [r.check for r in gearbox_rows(view(tau=100.0), RATED, None)]
+    assert "gearbox life" not in [r.check for r in gearbox_rows(joint_view(tau=100.0), RATED, None)]
 
 
 def test_average_speed_life_and_rms_count_pauses_and_average_torque_does_not():
@@ -90,7 +64,7 @@ def test_average_speed_life_and_rms_count_pauses_and_average_torque_does_not():
     t = np.array([0.0, 1.0, 1.0 + 1e-9, 4.0])
     tau, qd = np.array([80.0, 80.0, 80.0, 80.0]), np.array([1.0, 1.0, 0.0, 0.0])
     paused = replace(Duty.alone(t), powered=np.array([True, True, False, False]))
-    moving, whole = view(tau=-80.0, qd=1.0), view(tau=-tau, qd=qd, t=t, duty=paused)
+    moving, whole = joint_view(tau=-80.0, qd=1.0), joint_view(tau=-tau, qd=qd, t=t, duty=paused)
     one, all_of_it = ([*gearbox_rows(v, RATED, None), *motor_rows(v, RATED)] for v in (moving, whole))
     ratios = {
         name: row(all_of_it, name).demand / row(one, name).demand
@@ -106,19 +80,19 @@ def test_without_a_brake_a_pause_is_a_hold():
     t = np.array([0.0, 1.0])
     paused = Duty(Duty.alone(t).weight, np.array([False, False]))
     for brake, rms in ((DRIVE.brake, 0.0), (None, 0.5), (Sourced(False, MINE), 0.5)):
-        rows = motor_rows(view(tau=-80.0, duty=paused), replace(DRIVE, brake=brake))
+        rows = motor_rows(joint_view(tau=-80.0, duty=paused), replace(DRIVE, brake=brake))
         assert row(rows, "motor RMS torque").demand == pytest.approx(rms, rel=1e-12)
 
 
 def test_rms_of_a_held_torque_is_its_share():
     """-80 Nm at 1 rad/s is braked: 80 / 160 = 0.5 Nm."""
-    assert row(motor_rows(view(tau=-80.0, qd=1.0), DRIVE), "motor RMS torque").demand == pytest.approx(0.5, rel=1e-12)
+    assert row(motor_rows(joint_view(tau=-80.0, qd=1.0), DRIVE), "motor RMS torque").demand == pytest.approx(0.5, rel=1e-12)
 
 
 @pytest.mark.parametrize(("events", "verdict"), [(6200.0, Verdict.PASS), (6300.0, Verdict.FAIL), (None, Verdict.NOT_CHECKABLE)])
 def test_number_of_shocks_by_hand(events, verdict):
     """10 rpm at the joint, 1600 rpm at the input, for 30 ms: 0.8 turns, 1e4 / 1.6 = 6250 times."""
-    motion = view(tau=500.0, qd=[10 * RPM, 99.0], t=[0.0, 1.0])
+    motion = joint_view(tau=500.0, qd=[10 * RPM, 99.0], t=[0.0, 1.0])
     shock = Shock(np.zeros((2, 5)), True, np.array([True, False]), 0.03, events)
     found = row(gearbox_rows(motion, DRIVE, shock), "gearbox momentary peaks")
     assert found.verdict is verdict
@@ -128,19 +102,19 @@ def test_number_of_shocks_by_hand(events, verdict):
 
 def test_a_shock_at_rest_counts_once():
     shock = Shock(np.zeros((2, 5)), True, np.array([True, True]), 0.03, 1.0)
-    assert row(gearbox_rows(view(tau=500.0), DRIVE, shock), "gearbox momentary peaks").limit == 1e4
+    assert row(gearbox_rows(joint_view(tau=500.0), DRIVE, shock), "gearbox momentary peaks").limit == 1e4
 
 
 @pytest.mark.parametrize(("inertia", "verdict"), [(26.4, Verdict.PASS), (26.6, Verdict.WARN)])
 def test_resonance_by_hand(inertia, verdict):
     """8 Hz on 67 kNm/rad is 67e3 / (2 pi 8)^2 = 26.52 kg m^2; a guide, so that it warns and does not fail."""
-    found = row(gearbox_rows(view(inertia=inertia), DRIVE, None), "gearbox resonance")
+    found = row(gearbox_rows(joint_view(inertia=inertia), DRIVE, None), "gearbox resonance")
     assert found.limit == pytest.approx(8.0 * np.sqrt(26.517 / inertia), rel=1e-4)
     assert (found.demand, found.verdict) == (8.0, verdict)
 
 
 def test_wind_up_and_lost_motion_are_told():
-    rows = list(gearbox_rows(view(tau=-60.0), DRIVE, None))
+    rows = list(gearbox_rows(joint_view(tau=-60.0), DRIVE, None))
     told = {name: row(rows, f"gearbox {name}").demand for name in ("wind-up", "backlash", "hysteresis")}
     assert told == pytest.approx({"wind-up": 29 / 67e3 + 31 / 110e3, "backlash": 24e-6, "hysteresis": 290e-6}, rel=1e-12)
     assert {r.verdict for r in rows if r.check in [f"gearbox {name}" for name in told]} == {Verdict.INFO}
@@ -158,7 +132,7 @@ def test_wind_up_and_lost_motion_are_told():
 )
 def test_a_missing_figure_is_not_checkable(figure, check_name):
     bare = replace(DRIVE, gearbox=replace(GEAR, **{figure: None}))
-    assert row(gearbox_rows(view(tau=60.0, qd=0.1), bare, None), check_name).verdict is Verdict.NOT_CHECKABLE
+    assert row(gearbox_rows(joint_view(tau=60.0, qd=0.1), bare, None), check_name).verdict is Verdict.NOT_CHECKABLE
 
 
 # The motor
@@ -166,9 +140,9 @@ def test_a_missing_figure_is_not_checkable(figure, check_name):
 
 def test_lifting_155_8_newton_metres_at_no_speed():
     """155.8 / (160 x 0.65) = 1.498 Nm, and 0.42 Nm without load: 1.918 Nm. Coulomb friction is lifted with it."""
-    found = row(motor_rows(view(static=-155.8), DRIVE), "motor torque, quasi-static")
+    found = row(motor_rows(joint_view(static=-155.8), DRIVE), "motor torque, quasi-static")
     assert found.demand == pytest.approx(1.498 + 0.42, abs=5e-4)
-    rough = row(motor_rows(view(static=-145.8, coulomb=10.0), DRIVE), "motor torque, quasi-static")
+    rough = row(motor_rows(joint_view(static=-145.8, coulomb=10.0), DRIVE), "motor torque, quasi-static")
     assert rough.demand == pytest.approx(found.demand, rel=1e-12)
     assert found.limit == 7.2
 
@@ -180,7 +154,7 @@ def test_the_other_reading_of_the_efficiency():
     assert 172 / (160 * eta) + 0.42 == pytest.approx(172 / (160 * 0.65), rel=1e-12)
     assert motor_torque(DRIVE, 155.8, 0.3, 0.0, no_load_in_efficiency=True) == pytest.approx(1.538, abs=5e-4)
     assert motor_torque(DRIVE, 155.8, -0.3, 0.0, no_load_in_efficiency=True) == pytest.approx(155.8 / 160, rel=1e-12)
-    told = row(motor_rows(view(tau=155.8, qd=0.3), DRIVE), "motor torque, other reading")
+    told = row(motor_rows(joint_view(tau=155.8, qd=0.3), DRIVE), "motor torque, other reading")
     assert told.demand == pytest.approx(155.8 / (160 * eta) + 0.42, rel=1e-12)
     assert told.verdict is Verdict.INFO
 
@@ -189,7 +163,7 @@ def test_the_other_reading_of_the_efficiency():
 def test_a_reading_that_no_mesh_allows_is_left_out(change):
     bare = replace(DRIVE, gearbox=replace(GEAR, **change))
     assert mesh_efficiency(bare.gearbox) is None
-    assert "motor torque, other reading" not in [r.check for r in motor_rows(view(tau=100.0, qd=0.1), bare)]
+    assert "motor torque, other reading" not in [r.check for r in motor_rows(joint_view(tau=100.0, qd=0.1), bare)]
 
 
 @pytest.mark.parametrize(
@@ -198,7 +172,7 @@ def test_a_reading_that_no_mesh_allows_is_left_out(change):
 )
 def test_without_the_motors_torque_each_row_that_needs_it_is_not_checkable(part, figure):
     bare = replace(DRIVE, **{part: replace(getattr(DRIVE, part), **{figure: None})})
-    motion = view(tau=60.0, qd=[0.1, 0.2])
+    motion = joint_view(tau=60.0, qd=[0.1, 0.2])
     known, unknown = ([r.check for r in motor_rows(motion, drive)] for drive in (DRIVE, bare))
     assert unknown == known
     for name in (
@@ -225,7 +199,7 @@ def test_a_motors_tolerance_stands_with_each_of_its_torques():
         "motor torque, other reading",
     ]
     for speed in (0.1, 2.0):  # by the running torque, and on the curve
-        motion = view(tau=10.0, qd=speed)
+        motion = joint_view(tau=10.0, qd=speed)
         for name in (*names, "motor speed", "motor RMS torque", "motor against gearbox"):
             assert "(sheet values +-10%)" in row(motor_rows(motion, DRIVE), name).source, name
             assert "sheet values" not in row(motor_rows(motion, plain), name).source
@@ -234,7 +208,7 @@ def test_a_motors_tolerance_stands_with_each_of_its_torques():
 @pytest.mark.parametrize(("inertia", "verdict"), [(102.0, Verdict.PASS), (103.0, Verdict.WARN)])
 def test_inertia_ratio_by_hand(inertia, verdict):
     """Ten times the rotor's 4e-4 kg m^2 is 10 x 4e-4 x 160^2 = 102.4 kg m^2 at the joint."""
-    found = row(motor_rows(view(inertia=inertia), DRIVE), "motor inertia ratio")
+    found = row(motor_rows(joint_view(inertia=inertia), DRIVE), "motor inertia ratio")
     assert found.demand == pytest.approx(10.0 * inertia / 102.4, rel=1e-12)
     assert found.verdict is verdict
 
@@ -251,7 +225,7 @@ def test_a_motor_that_dwells_in_resonance_is_warned_of(seconds, verdict):
     """Ten periods are 71.1 ms."""
     speed = 42.2 * RPM / 160
     t = np.array([0.0, 1.0, 1.0 + 1e-9, 1.0 + seconds, 1.0 + seconds + 1e-9, 3.0])
-    motion = view(qd=[0.0, 0.0, speed, speed, 0.0, 0.0], t=t)
+    motion = joint_view(qd=[0.0, 0.0, speed, speed, 0.0, 0.0], t=t)
     found = row(motor_rows(motion, DRIVE), "motor resonance dwell")
     assert found.demand == pytest.approx(seconds, abs=1e-6)
     assert found.at_s == pytest.approx(1.0, abs=1e-6)
@@ -269,27 +243,27 @@ def test_dwell_of_ramps_is_exact_between_samples():
 
 def test_the_motor_can_break_the_gearbox():
     """7.2 x 160 x 0.65 = 749 Nm; 460 Nm is passed at 4.42 Nm, with the better mesh at 460 / (160 x 0.8713) + 0.42 = 3.72."""
-    found = row(motor_rows(view(), DRIVE), "motor against gearbox")
+    found = row(motor_rows(joint_view(), DRIVE), "motor against gearbox")
     assert (found.demand, found.limit, found.verdict) == (pytest.approx(748.8), 460.0, Verdict.WARN)
     assert "limit its current to 52% (4.9 A), 3.72 Nm at the motor" in found.source
     plain = replace(DRIVE, gearbox=replace(GEAR, continuous_torque=None))
-    assert "4.42 Nm at the motor" in row(motor_rows(view(), plain), "motor against gearbox").source
+    assert "4.42 Nm at the motor" in row(motor_rows(joint_view(), plain), "motor against gearbox").source
     weak = replace(DRIVE, motor=Catalogue.load().motors["MST340B02"])
-    assert row(motor_rows(view(), weak), "motor against gearbox").verdict is Verdict.PASS
+    assert row(motor_rows(joint_view(), weak), "motor against gearbox").verdict is Verdict.PASS
 
 
 @pytest.mark.parametrize(("part", "figure"), [("motor", "running_torque"), ("gearbox", "start_stop_torque")])
 def test_overload_without_a_figure_is_not_checkable(part, figure):
     bare = replace(DRIVE, **{part: replace(getattr(DRIVE, part), **{figure: None})})
-    assert row(motor_rows(view(), bare), "motor against gearbox").verdict is Verdict.NOT_CHECKABLE
+    assert row(motor_rows(joint_view(), bare), "motor against gearbox").verdict is Verdict.NOT_CHECKABLE
 
 
 def test_a_warning_on_the_curve_is_not_hidden_by_a_sample_off_it():
     """On the curve 60 % to spare, an estimate's warning; off it, at 60 rpm, 55 %, a pass: the row warns."""
     fast, slow = 1500 * RPM / 160, 60 * RPM / 160
-    curve = row(motor_rows(view(tau=10.0, qd=fast), DRIVE), "motor torque").limit
+    curve = row(motor_rows(joint_view(tau=10.0, qd=fast), DRIVE), "motor torque").limit
     joint = [(available / (1.0 + spare) - 0.42) * 160 * 0.65 for available, spare in ((7.2, 0.55), (curve, 0.60))]
-    found = row(motor_rows(view(tau=joint, qd=[slow, fast]), DRIVE), "motor torque")
+    found = row(motor_rows(joint_view(tau=joint, qd=[slow, fast]), DRIVE), "motor torque")
     assert found.verdict is Verdict.WARN
     assert found.margin == pytest.approx(0.60, abs=1e-9)
 
@@ -297,7 +271,7 @@ def test_a_warning_on_the_curve_is_not_hidden_by_a_sample_off_it():
 def test_90_degrees_in_2_seconds():
     """45 deg/s on average are 160 x 45 / 6 = 1200 rpm, a cubic's peak is half as much again; 1000 rpm are 37.5 deg/s."""
     t = np.linspace(0.0, 2.0, 2001)
-    rows = list(gearbox_rows(view(tau=50.0, qd=np.radians(90.0) * (6 * t / 4 - 6 * t**2 / 8), t=t), DRIVE, None))
+    rows = list(gearbox_rows(joint_view(tau=50.0, qd=np.radians(90.0) * (6 * t / 4 - 6 * t**2 / 8), t=t), DRIVE, None))
     assert row(rows, "gearbox average input speed").demand / RPM == pytest.approx(1200.0, rel=1e-6)
     assert row(rows, "gearbox input speed").demand / RPM == pytest.approx(1800.0, rel=1e-12)
     assert np.radians(37.5) * 160 / RPM == pytest.approx(1000.0, rel=1e-12)
@@ -315,7 +289,7 @@ def test_more_torque_never_improves_a_verdict():
         tau, qd = rng.normal(0.0, 40.0, t.size), rng.normal(0.0, 0.4, t.size)
         worst: dict[str, int] = {}
         for factor in np.geomspace(0.3, 12.0, 12):
-            for r in drive_rows(view(tau=factor * tau, qd=qd, t=t), RATED):
+            for r in drive_rows(joint_view(tau=factor * tau, qd=qd, t=t), RATED):
                 if r.verdict in RANKS:
                     rank = RANKS.index(r.verdict)
                     assert rank >= worst.get(r.check, 0), (r.check, factor)

@@ -11,10 +11,11 @@ from planner.checks.stopping import MOMENTS, Way, stop, worst_stop
 from planner.paths.path import JointLine, through
 from planner.timing.profile import Profile
 from planner.timing.timing import Timing, timed
+from tests.builders import motion_along, without_drives
 from tests.limits import worst
 
 BOOM = Boom.load()
-BARE = replace(BOOM, drives=(None,) * 5)
+BARE = without_drives(BOOM)
 LIMITS = BOOM.limits
 START, GOAL = BOOM.pose("transport"), BOOM.pose("phenotyping")
 VIA = np.array([[0.4, 0.3, 1.4, 0.2, -0.5], [0.9, 0.5, 1.9, 0.7, 0.1]])
@@ -22,8 +23,7 @@ SINGLE = np.array([1.0, 0.5, 1.5, 0.1, 0.1]), np.array([1.0, 0.5, 1.5, 0.9, 0.1]
 
 
 def motion_of(boom, path, profile, **options):
-    (motion,) = timed(boom, [path], Timing.of(profile, **options), None)
-    return motion
+    return motion_along(boom, path, Timing.of(profile, **options))
 
 
 @pytest.mark.parametrize("curved", [False, True], ids=["straight", "curved"])

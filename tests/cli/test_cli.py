@@ -14,6 +14,7 @@ from boom_model.boom_file import BOOM_FILE
 from planner import Cubic, TimeOptimal, cli, plan
 from planner.motion.trajectory import read_csv
 from planner.timing.profile import Profile
+from tests.builders import STRONG_CATALOGUE, UNDERSIZED_MISSION, main_move
 
 
 def test_plan_does_the_main_job(boom, tmp_path):
@@ -24,8 +25,7 @@ def test_plan_does_the_main_job(boom, tmp_path):
     assert len(out.splitlines()) <= 20
     assert max(map(len, out.splitlines())) <= 80
     assert "assumed: lower bus voltage 80 V" in boom("plan", "transport", "phenotyping", "--all")[1]
-    expected = plan(Boom.load(), "transport", "phenotyping")
-    np.testing.assert_array_equal(read_csv("move.csv").q, expected.trajectory.q)
+    np.testing.assert_array_equal(read_csv("move.csv").q, main_move().trajectory.q)
 
 
 @pytest.mark.parametrize("profile", [profile.value for profile in Profile])
@@ -51,7 +51,7 @@ def test_plan_takes_payload_duration_and_boom(boom, tmp_path):
 
 def test_the_profiles_to_choose_from_are_the_planners():
     (option,) = [each for each in cli.cli.commands["plan"].params if each.name == "profile"]
-    assert list(option.type.choices) == [profile.value for profile in Profile]
+    assert list(option.type.words) == [profile.value for profile in Profile]
 
 
 VIA = ("--via", "q=40,30,90,0.3,-10")
@@ -126,7 +126,7 @@ def test_profiles_stand_side_by_side(boom):
     assert list(rows) == [*Profile, "time-optimal, jerk bound"]
     for name, row in rows.items():
         profile = TimeOptimal(jerk_bound=True) if "bound" in name else name
-        report = plan(Boom.load(), "transport", "phenotyping", profile=profile).full_report
+        report = main_move(profile).full_report
         worst = {each.limit: each.ratio for each in report.certificate.worst}
         assert row["duration_s"] == pytest.approx(report.duration, rel=1e-12)
         assert (row["stop_s"], row["stop_m"]) == (report.stop.time_s, report.stop.distance_m)
@@ -143,7 +143,7 @@ def test_profiles_stand_side_by_side(boom):
     assert code == 0
     for name, row in rows.items():
         assert any(name.split(",")[0] in line and f"{row['duration_s']:.3f} s" in line for line in out.splitlines())
-    assert out.count("jumps") == 3
+    assert all("INCOMPLETE" in line for line in out.splitlines() if " s " in line)
 
 
 def test_vehicle_is_taken_by_plan_and_check(boom):
@@ -219,7 +219,7 @@ def test_check_of_a_motion_outside_the_limits_reports_and_fails(boom):
     boom("plan", "transport", "phenotyping", "--csv", "move.csv")
     code, out, _ = boom("check", "move.csv", "--payload", "60")
     assert code == 1
-    assert "FAIL: fails: inner gearbox" in out
+    assert "FAIL: inner gearbox" in out
     code, out, _ = boom("check", "move.csv", "--json")
     assert code == 0
     assert json.loads(out)["profile"] == "recorded"
@@ -240,7 +240,7 @@ def test_validate_holds(boom):
     [
         (("plan", "transport", "parking"), 2, "unknown pose 'parking'"),
         (("plan", "transport"), 2, "Missing argument 'GOAL'"),
-        (("plan", "transport", "phenotyping", "--profile", "fast"), 2, "'fast' is not one of"),
+        (("plan", "transport", "phenotyping", "--profile", "fast"), 2, "unknown profile 'fast'; there are: cubic"),
         (("plan", "transport", "phenotyping", "--duration", "nan"), 2, "duration is nan"),
         (("plan", "transport", "phenotyping", "--duration", "1"), 1, "needs at least 5 s"),
         (("plan", "transport", "phenotyping", "--payload", "-1"), 2, "payload is -1"),
@@ -253,15 +253,19 @@ def test_validate_holds(boom):
         (("plan", "transport", "q=0,130,180,0,0"), 1, "inner 130 deg is 10 deg above"),
         (("plan", "transport", "tip=2,0,3", "--constraint", "extension=0"), 1, "out of reach"),
         (("plan", "transport", "tip=0,2.5,0.8", "--pitch", "up"), 1, "wrist 180 deg is 90 deg above its limit"),
-        (("plan", "transport", "tip=1,0,1", "--constraint", "sideways"), 2, "constraint 'sideways' is not known"),
+        (
+            ("plan", "transport", "tip=1,0,1", "--constraint", "sideways"),
+            2,
+            "unknown constraint 'sideways'; there are: horizontal",
+        ),
         (("ik", "1", "nan", "1"), 2, "position[1] is nan"),
         (("ik", "1", "x", "1"), 2, "'x' is not a valid float"),
         (("ik", "1", "0", "1", "--hodl", "horizontal"), 2, "--hodl"),
         (("torque", "none.csv", "--out", "x.csv"), 2, "none.csv: cannot be read"),
         (("check", "bad.toml"), 2, "bad.toml: lacks the column"),
         (("view", "none.rrd"), 2, "none.rrd"),
-        (("plan", "transport", "phenotyping", "--csv", "move.rrd"), 2, "it is to hold two things"),
-        (("plan", "transport", "phenotyping", "--out", "."), 2, "cannot be written"),
+        (("plan", "transport", "phenotyping", "--csv", "move.rrd"), 2, "move.rrd: the name must end in .csv"),
+        (("plan", "transport", "phenotyping", "--out", "."), 2, "the name must end in .rrd"),
         (("plan", "transport", "phenotyping", "--duration", "2e5"), 2, "needs more than 10,000,000 samples"),
         (("plan", "transport", "phenotyping", "--along", "line"), 2, "is not a tip target"),
         (("check", "twice.csv"), 2, "repeats the column q1"),
@@ -387,10 +391,8 @@ def test_size_stands_on_a_slope(boom):
 
 
 def test_size_replans_a_mission_that_the_fitted_drive_cannot_do(boom, tmp_path):
-    from tests.sizing.test_sizing import STRONG, UNDERSIZED
-
-    (tmp_path / "quick.toml").write_text(UNDERSIZED)
-    (tmp_path / "strong.toml").write_text(STRONG)
+    (tmp_path / "quick.toml").write_text(UNDERSIZED_MISSION)
+    (tmp_path / "strong.toml").write_text(STRONG_CATALOGUE)
     asked = ("size", "quick.toml", "--joint", "lower", "--payload", "30", "--catalogue", "strong.toml")
     for adapt in ("nothing", "rescale"):
         code, out, err = boom(*asked, "--adapt", adapt)

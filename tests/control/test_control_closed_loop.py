@@ -25,6 +25,7 @@ from planner.control.closed_loop import LONGEST_STEP
 from planner.control.simulation import simulate as simulate_freely
 from planner.motion.vehicle import load_case
 from planner.timing.timing import Profile
+from tests.builders import main_move, plant_energy, with_running_torque
 from tests.oracles import mujoco_model, tree_matrix
 
 BOOM = Boom.load()
@@ -35,7 +36,7 @@ STRAIGHT = impulses(Shaper.NONE, 5.0, 0.02)
 
 @pytest.fixture(scope="module")
 def moves():
-    return {profile: plan(BOOM, "transport", "phenotyping", profile=profile) for profile in Profile}
+    return {profile: main_move(profile) for profile in Profile}
 
 
 def case(plant, controller, move, goals=None):
@@ -162,15 +163,13 @@ def test_pd_is_passive(moves):
     still = plan(BOOM, "phenotyping", "phenotyping")
     loop = case(plant, Controller.PD, still)
     run = simulate(plant, [loop], 1.5, gust=Gust((0.0, 60.0, -60.0), 0.0, 0.5), continuous=True)
-    from tests.control.test_control_plant import energy
-
     after = run.t > 0.5
     E = [1, 2]
     motor_d = np.gradient(run.motor[:, 0], run.t, axis=0)
     x = np.concatenate([run.q[:, 0], run.qd[:, 0], run.motor[:, 0][:, E], motor_d[:, E]], axis=1)
     off = run.command[:, 0] - run.motor[:, 0]
     given = np.sum(gravity_torque(BOOM, GOAL) * run.motor[:, 0], axis=-1)  # the constant feedforward's potential
-    total = (energy(plant, x) - given + 0.5 * np.einsum("ki,ij,kj->k", off, loop.gains[0].Kp, off))[after]
+    total = (plant_energy(plant, x) - given + 0.5 * np.einsum("ki,ij,kj->k", off, loop.gains[0].Kp, off))[after]
     assert total[0] - total[-1] > 0.01
     assert (np.diff(total) < 2e-5).all()
 
@@ -224,7 +223,7 @@ def test_encoders_tell_no_more_than_their_counts(moves):
 
 
 def test_what_a_motor_has_not_it_does_not_give(moves):
-    weak = replace(BOOM, drives=tuple(d and replace(d, motor=replace(d.motor, running_torque=1.7)) for d in BOOM.drives))
+    weak = with_running_torque(BOOM, 1.7)
     plant = Plant.of(BOOM, EXACT, reference=GOAL).with_boom(weak)
     loop = case(plant, Controller.PID, moves[Profile.CUBIC])
     run = simulate(plant, [loop], 0.6)
@@ -239,8 +238,7 @@ def test_a_stepper_loses_steps_where_its_pull_is_beaten(moves):
     plant = Plant.of(BOOM, reference=GOAL)
     held = case(plant, Controller.STEPPER, plan(BOOM, "phenotyping", "phenotyping"))
     for running, loses in ((2.0, False), (1.0, True)):  # 200 Nm at joint 3 are 1.25 Nm at its motor
-        motors = tuple(d and replace(d, motor=replace(d.motor, running_torque=running)) for d in BOOM.drives)
-        run = simulate(plant.with_boom(replace(BOOM, drives=motors)), [held], 0.5)
+        run = simulate(plant.with_boom(with_running_torque(BOOM, running)), [held], 0.5)
         assert np.isfinite(run.lost[0, 2]) == loses
         assert np.isnan(run.lost[0, [0, 3, 4]]).all()
 

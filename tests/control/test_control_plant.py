@@ -14,7 +14,6 @@ from boom_model import (
     inverse_dynamics,
     kinetic_energy,
     mass_matrix,
-    potential_energy,
 )
 from boom_model.drives.drive import motor_torque
 from planner.control import Figures, Plant, linearise, natural_frequencies, parse_figures
@@ -31,6 +30,7 @@ from planner.control.plant import (
     twist_under,
 )
 from tests.beam_frame import frequencies
+from tests.builders import plant_energy
 from tests.oracles import derivative, pinocchio_model, random_states, tree_matrix
 
 BOOM = Boom.load()
@@ -101,13 +101,6 @@ def test_equilibrium_holds_the_weight():
     np.testing.assert_allclose(qdd, 0.0, atol=2e-10)
 
 
-def energy(plant, x):
-    E = list(plant.elastic)
-    q, qd, theta, theta_d = x[..., :5], x[..., 5:10], x[..., 10:12], x[..., 12:]
-    links = kinetic_energy(plant.boom, q, qd) + potential_energy(plant.boom, q)
-    return links + 0.5 * (plant.rotor[E] * theta_d**2).sum(axis=-1) + spring_energy(plant, q, theta - q[..., E])
-
-
 def fall(plant):
     """Half a second without torques, in steps of 1 ms by the classical Runge-Kutta method."""
     x = np.concatenate([GOAL, [0.3, -0.2, 0.1, 0.1, 0.2], GOAL[[1, 2]] + 1e-3, [0.1, -0.1]])[None]
@@ -129,7 +122,7 @@ def fall(plant):
 def test_an_elastic_boom_without_friction_keeps_its_energy():
     plant = Plant.of(BOOM, SMOOTH)
     path = fall(plant)
-    total = energy(plant, path)
+    total = plant_energy(plant, path)
     moved = kinetic_energy(BOOM, path[:, :5], path[:, 5:10])
     assert np.ptp(moved) > 50.0
     assert np.ptp(spring_energy(plant, path[:, :5], (path[:, 10:12] - path[:, [1, 2]]))) > 0.3
@@ -139,7 +132,7 @@ def test_an_elastic_boom_without_friction_keeps_its_energy():
 def test_damping_and_friction_only_take_energy():
     rough = replace(BOOM, friction=Friction(np.full(5, 3.0), np.full(5, 2.0), (None,) * 5))
     for plant in (Plant.of(BOOM), Plant.of(rough, SMOOTH)):
-        total = energy(plant, fall(plant))
+        total = plant_energy(plant, fall(plant))
         assert (np.diff(total) < 0.0).all()
         assert total[0] - total[-1] > 1.0
 

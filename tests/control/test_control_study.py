@@ -5,20 +5,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from boom_model import JOINTS, Boom, InputError
 from planner import plan
 from planner.control import Controller, Figures, Goals, Outcome, Setup, Shaper, study
 from planner.control.study import _outcome, _overshoot, _residual
 from planner.recording import write_control_recording
+from tests.builders import main_move, with_running_torque
+from tests.recordings import recorded_entities, recorded_rows
 
 BOOM = Boom.load()
 
 
 @pytest.fixture(scope="module")
 def moves():
-    return [plan(BOOM, "transport", "phenotyping", profile=profile) for profile in ("cubic", "jerk-limited")]
+    return [main_move(profile) for profile in ("cubic", "jerk-limited")]
 
 
 @pytest.fixture(scope="module")
@@ -101,8 +102,7 @@ def test_a_loop_that_its_poles_alone_betray_is_unstable(found):
 
 
 def test_a_move_that_asks_more_than_a_motor_has_saturates_it():
-    motors = tuple(d and replace(d, motor=replace(d.motor, running_torque=1.27)) for d in BOOM.drives)
-    row = short(Controller.PID, replace(BOOM, drives=motors))
+    row = short(Controller.PID, with_running_torque(BOOM, 1.27))
     assert row.outcome is Outcome.SATURATES
     assert row.peak_torque_ratio > 1.0
     assert 0.0 < row.saturated_share < 1.0
@@ -190,8 +190,11 @@ def test_the_command_fails_where_the_boom_does(boom, tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--controller", "pdd"), "controller is 'pdd'; there are: pd, pid, computed-torque, lqr, stepper, or all"),
-        (("--profile", "cubic,slow"), "profile is 'slow'"),
+        (
+            ("--controller", "pdd"),
+            "unknown controller 'pdd'; did you mean pd? There are: pd, pid, computed-torque, lqr, stepper, or all",
+        ),
+        (("--profile", "cubic,slow"), "unknown profile 'slow'"),
         (("--set", "rate=5"), "unknown figure 'rate'"),
         (("--bandwidth", "-1"), "bandwidth is -1 Hz; it must be between 0.001 and 100000 Hz"),
         (("--gust", "1,2"), "is not FX,FY,FZ,START,DURATION"),
@@ -216,14 +219,10 @@ def test_bad_input_is_named(boom, tmp_path, options, message):
 def test_the_recording_holds_every_case(found, tmp_path):
     path = tmp_path / "c.rrd"
     write_control_recording(path, found)
-    reader = RrdReader(path)
-    entities = set(reader.store().schema().entity_paths())
+    entities = recorded_entities(path)
     for row in found.rows:
         name = f"/cases/{row.profile}/{row.controller}/{row.shaper}"
         assert {f"{name}/{kind}/{joint}" for kind in ("q", "error", "tau") for joint in JOINTS} <= entities
     assert {"/report", "/pictures/loops", "/pictures/errors", "/world/boom/tip"} <= entities
-    stream = reader.stream().filter(content="/tip_error/cubic/none", is_static=False, components="Scalars:scalars")
-    batches = [chunk.to_record_batch() for chunk in stream.to_chunks()]
-    batches.sort(key=lambda batch: batch.column("t")[0].value)
-    values = np.array([row for batch in batches for row in batch.column("Scalars:scalars").to_pylist()])
+    values = recorded_rows(path, "/tip_error/cubic/none", "Scalars:scalars")
     np.testing.assert_array_equal(values, 1e3 * found.tip_error[::5, :2])

@@ -11,7 +11,6 @@ import numpy as np
 import pyarrow as pa
 import pytest
 from pyarrow import csv
-from rerun.chunk import RrdReader
 
 from boom_model import (
     JOINTS,
@@ -25,16 +24,26 @@ from boom_model import (
     jacobian,
 )
 from boom_model.arrays import Array
-from planner import Trajectory, plan
+from planner import Move, Trajectory
 from planner.experiments.comparison import Log, Smoothed, compare, read_log, smoothed
 from planner.motion.trajectory import read_csv, write_csv
 from planner.recording import write_comparison_recording
+from tests.builders import main_move
+from tests.recordings import recorded_rows
 
 BOOM = Boom.load()
-MOVE = plan(BOOM, "transport", "phenotyping", profile="jerk-limited", step=0.01).trajectory
-FINE = plan(BOOM, "transport", "phenotyping", profile="jerk-limited", step=1e-3)
 SIGMA = np.array([1e-4, 1e-4, 1e-4, 5e-5, 2e-4])
 """Noise of an encoder [rad, m]."""
+
+
+@pytest.fixture
+def planned() -> Trajectory:
+    return main_move("jerk-limited", step=0.01).trajectory
+
+
+@pytest.fixture
+def finer() -> Move:
+    return main_move("jerk-limited", step=1e-3)
 
 
 def noisy(t: Array, q: Array, seed: int = 5) -> Array:
@@ -52,45 +61,45 @@ def smooth_motion(t: Array) -> tuple[Array, Array, Array]:
     return middle + size * np.sin(phase), size * w * np.cos(phase), -size * w**2 * np.sin(phase)
 
 
-def test_a_log_of_the_plan_itself_shows_no_error():
-    log = Log.of(MOVE.t, MOVE.q, MOVE.qd, MOVE.qdd, np.zeros_like(MOVE.q))
-    found = compare(BOOM, MOVE, log)
+def test_a_log_of_the_plan_itself_shows_no_error(planned: Trajectory):
+    log = Log.of(planned.t, planned.q, planned.qd, planned.qdd, np.zeros_like(planned.q))
+    found = compare(BOOM, planned, log)
     assert np.abs(found.joint_error).max() < 1e-15
     assert found.tip_error.max() < 1e-15
     np.testing.assert_allclose(found.tau_measured, found.tau_planned, rtol=0, atol=1e-11)
-    np.testing.assert_array_equal(found.tau_logged, np.zeros_like(MOVE.q))
+    np.testing.assert_array_equal(found.tau_logged, np.zeros_like(planned.q))
     assert found.inside.all()
     assert (found.torque_noise < 1e-3).all()  # what the filter rounds off the motion
 
 
-def test_between_its_samples_the_plan_is_the_planned_motion():
+def test_between_its_samples_the_plan_is_the_planned_motion(planned: Trajectory, finer: Move):
     """A cubic through q and qd of a jerk-limited move is that move, but where the jerk jumps within a step."""
-    finer = FINE.trajectory
-    found = compare(BOOM, MOVE, Log.of(finer.t, finer.q, finer.qd, finer.qdd))
+    samples = finer.trajectory
+    found = compare(BOOM, planned, Log.of(samples.t, samples.q, samples.qd, samples.qdd))
     assert np.abs(found.joint_error).max() < 1e-8
     assert np.abs(found.planned.qd - found.measured.qd).max() < 5e-6
 
 
-def test_an_error_that_was_put_in_comes_out_where_it_was():
-    error = np.zeros_like(MOVE.q)
+def test_an_error_that_was_put_in_comes_out_where_it_was(planned: Trajectory):
+    error = np.zeros_like(planned.q)
     at = 200
     error[at] = 0.0, 2e-3, -1e-3, 5e-4, 0.0
-    found = compare(BOOM, MOVE, Log.of(MOVE.t, MOVE.q + error, MOVE.qd, MOVE.qdd))
+    found = compare(BOOM, planned, Log.of(planned.t, planned.q + error, planned.qd, planned.qdd))
     np.testing.assert_allclose(found.joint_error, error, rtol=0, atol=1e-15)
     answer = found.to_json({})
-    assert answer["tip"]["at_s"] == MOVE.t[at]
-    shift = jacobian(BOOM, MOVE.q[at])[:3] @ error[at]
+    assert answer["tip"]["at_s"] == planned.t[at]
+    shift = jacobian(BOOM, planned.q[at])[:3] @ error[at]
     assert answer["tip"]["peak_m"] == pytest.approx(np.linalg.norm(shift), rel=5e-3)
-    np.testing.assert_allclose(answer["tip"]["planned_m"], forward_kinematics(BOOM, MOVE.q[at]).position, rtol=1e-14)
+    np.testing.assert_allclose(answer["tip"]["planned_m"], forward_kinematics(BOOM, planned.q[at]).position, rtol=1e-14)
     extension = answer["joints"][3]["position"]
-    assert (extension["unit"], extension["error"]["at_s"]) == ("m", MOVE.t[at])
+    assert (extension["unit"], extension["error"]["at_s"]) == ("m", planned.t[at])
     assert extension["error"]["peak"] == pytest.approx(5e-4, rel=1e-12)
-    assert extension["error"]["rms"] == pytest.approx(5e-4 / np.sqrt(MOVE.t.size), rel=1e-9)
+    assert extension["error"]["rms"] == pytest.approx(5e-4 / np.sqrt(planned.t.size), rel=1e-9)
 
 
-def test_logged_torques_are_held_against_the_models():
-    tau = inverse_dynamics(BOOM, MOVE.q, MOVE.qd, MOVE.qdd).tau
-    found = compare(BOOM, MOVE, Log.of(MOVE.t, MOVE.q, MOVE.qd, MOVE.qdd, tau + 7.0 * np.eye(5)[1]))
+def test_logged_torques_are_held_against_the_models(planned: Trajectory):
+    tau = inverse_dynamics(BOOM, planned.q, planned.qd, planned.qdd).tau
+    found = compare(BOOM, planned, Log.of(planned.t, planned.q, planned.qd, planned.qdd, tau + 7.0 * np.eye(5)[1]))
     difference = found.to_json({})["joints"][1]["torque"]["logged_less_measured"]
     assert (difference["peak"], difference["mean"]) == (pytest.approx(7.0, abs=1e-11), pytest.approx(7.0, abs=1e-11))
 
@@ -140,21 +149,21 @@ def test_a_plain_spline_would_drown_the_torques(tmp_path: Path):
 
 
 @pytest.mark.parametrize("lag", [-0.8, 0.0, 1.2345])
-def test_the_best_offset_finds_the_clocks_difference(lag: float):
+def test_the_best_offset_finds_the_clocks_difference(lag: float, planned: Trajectory):
     """With rest before and after the move, and noise: to some 4 of its standard deviations."""
     rest = np.arange(0.0, 0.5, 0.01)
     still = np.ones((rest.size, 1))
-    t = np.concatenate([rest - 0.5, MOVE.t, MOVE.t[-1] + 0.01 + rest])
-    q = np.concatenate([still * MOVE.q[0], MOVE.q, still * MOVE.q[-1]])
+    t = np.concatenate([rest - 0.5, planned.t, planned.t[-1] + 0.01 + rest])
+    q = np.concatenate([still * planned.q[0], planned.q, still * planned.q[-1]])
     log = Log.of(t - lag, noisy(t, q))
-    found = compare(BOOM, MOVE, log, offset=None)
+    found = compare(BOOM, planned, log, offset=None)
     assert found.offset == found.best_offset
     weight = 1.0 / (BOOM.limits.upper - BOOM.limits.lower)
-    scatter = np.sqrt(np.sum((weight**2 * SIGMA * MOVE.qd) ** 2)) / np.sum((weight * MOVE.qd) ** 2)
+    scatter = np.sqrt(np.sum((weight**2 * SIGMA * planned.qd) ** 2)) / np.sum((weight * planned.qd) ** 2)
     assert abs(found.offset - lag) < 4.0 * scatter
-    assert found.planned.t[0] >= MOVE.t[0]
-    assert found.planned.t[-1] <= MOVE.t[-1]
-    assert abs(compare(BOOM, MOVE, log, offset=lag).best_offset - found.offset) < 1e-9
+    assert found.planned.t[0] >= planned.t[0]
+    assert found.planned.t[-1] <= planned.t[-1]
+    assert abs(compare(BOOM, planned, log, offset=lag).best_offset - found.offset) < 1e-9
 
 
 def test_the_best_offset_finds_a_piece_of_a_long_motion_of_many_cycles():
@@ -162,16 +171,21 @@ def test_the_best_offset_finds_a_piece_of_a_long_motion_of_many_cycles():
     t = np.arange(6000) * 0.01
     swing = 0.005 * t[:, None] * np.array([1.0, 0.5, 0.5, 0.3, 1.0])
     q = np.array([1.0, 0.8, 2.0, 0.5, 0.0]) + swing * np.sin(2 * np.pi * t)[:, None]
-    planned = Trajectory.from_samples(t, q, np.gradient(q, t, axis=0), np.zeros_like(q))
+    swings = Trajectory.from_samples(t, q, np.gradient(q, t, axis=0), np.zeros_like(q))
     piece = slice(3140, 3640)
     log = Log.of(t[piece] - 31.4, noisy(t[piece], q[piece]))
-    assert compare(BOOM, planned, log, offset=None).offset == pytest.approx(31.4, abs=1e-3)
+    assert compare(BOOM, swings, log, offset=None).offset == pytest.approx(31.4, abs=1e-3)
 
 
-def test_a_delay_is_an_error_unless_it_is_fitted_away():
-    delayed = Log.of(MOVE.t, compare(BOOM, MOVE, Log.of(MOVE.t, MOVE.q, MOVE.qd, MOVE.qdd)).planned.q, MOVE.qd, MOVE.qdd)
+def test_a_delay_is_an_error_unless_it_is_fitted_away(planned: Trajectory):
+    delayed = Log.of(
+        planned.t,
+        compare(BOOM, planned, Log.of(planned.t, planned.q, planned.qd, planned.qdd)).planned.q,
+        planned.qd,
+        planned.qdd,
+    )
     late = Log.of(delayed.t + 0.02, delayed.q, delayed.qd, delayed.qdd)
-    seen, fitted = compare(BOOM, MOVE, late), compare(BOOM, MOVE, late, offset=None)
+    seen, fitted = compare(BOOM, planned, late), compare(BOOM, planned, late, offset=None)
     assert (seen.offset, fitted.offset) == (0.0, pytest.approx(-0.02, abs=1e-6))
     assert seen.tip_error.max() > 1e-2
     assert fitted.tip_error.max() < 1e-5
@@ -190,10 +204,10 @@ def test_uneven_steps_are_evened_out_and_said_so():
     assert smoothed(Log.of(np.arange(100) * 0.01, q[:100])).trajectory.notes[0].startswith("the log has no velocities")
 
 
-def test_notes_say_whose_they_are_and_what_is_assumed():
+def test_notes_say_whose_they_are_and_what_is_assumed(planned: Trajectory):
     friction = replace(BOOM.friction, origins=(None, Origin(Basis.ASSUMED, "this test"), None, None, None))
-    plan_from_file = replace(MOVE, notes=("from a file",))
-    found = compare(replace(BOOM, friction=friction), plan_from_file, Log.of(MOVE.t, MOVE.q, MOVE.qd))
+    plan_from_file = replace(planned, notes=("from a file",))
+    found = compare(replace(BOOM, friction=friction), plan_from_file, Log.of(planned.t, planned.q, planned.qd))
     plan_note, log_note, assumed = found.notes
     assert plan_note == "plan: from a file"
     assert log_note.startswith("log: the log has no accelerations; they are computed from its velocities")
@@ -210,22 +224,24 @@ def test_notes_say_whose_they_are_and_what_is_assumed():
         ({"offset": 50.0}, "fewer than two samples in common; the offset that fits best is"),
     ],
 )
-def test_what_cannot_be_compared_is_refused(change: dict[str, float], message: str):
+def test_what_cannot_be_compared_is_refused(change: dict[str, float], message: str, planned: Trajectory):
     with pytest.raises(InputError, match=message):
-        compare(BOOM, MOVE, Log.of(MOVE.t, MOVE.q), **change)
+        compare(BOOM, planned, Log.of(planned.t, planned.q), **change)
 
 
-def test_a_gap_longer_than_the_window_is_refused():
-    keep = (MOVE.t < 2.0) | (MOVE.t > 2.5)
+def test_a_gap_longer_than_the_window_is_refused(planned: Trajectory):
+    keep = (planned.t < 2.0) | (planned.t > 2.5)
     with pytest.raises(InputError, match=r"a gap of 0\.5"):
-        smoothed(Log.of(MOVE.t[keep], MOVE.q[keep]))
+        smoothed(Log.of(planned.t[keep], planned.q[keep]))
 
 
-def test_a_log_that_does_not_fit_together_is_refused(tmp_path: Path):
+def test_a_log_that_does_not_fit_together_is_refused(tmp_path: Path, planned: Trajectory):
     with pytest.raises(InputError, match="tau has shape"):
-        Log.of(MOVE.t, MOVE.q, tau=MOVE.q[1:])
+        Log.of(planned.t, planned.q, tau=planned.q[1:])
     with pytest.raises(InputError, match="the plan has a single sample"):
-        compare(BOOM, Trajectory.from_samples([0.0], MOVE.q[:1], MOVE.qd[:1], MOVE.qdd[:1]), Log.of(MOVE.t, MOVE.q))
+        compare(
+            BOOM, Trajectory.from_samples([0.0], planned.q[:1], planned.qd[:1], planned.qdd[:1]), Log.of(planned.t, planned.q)
+        )
 
 
 # The recording and the command
@@ -237,9 +253,9 @@ def write_log(path: Path, t: Array, q: Array, tau: Array | None = None) -> None:
     csv.write_csv(pa.table({name: np.ascontiguousarray(c) for name, c in columns.items()}), path)
 
 
-def test_the_recording_holds_both(tmp_path: Path):
-    tau = inverse_dynamics(BOOM, MOVE.q, MOVE.qd, MOVE.qdd).tau
-    found = compare(BOOM, MOVE, Log.of(MOVE.t, noisy(MOVE.t, MOVE.q), tau=tau))
+def test_the_recording_holds_both(tmp_path: Path, planned: Trajectory):
+    tau = inverse_dynamics(BOOM, planned.q, planned.qd, planned.qdd).tau
+    found = compare(BOOM, planned, Log.of(planned.t, noisy(planned.t, planned.q), tau=tau))
     write_comparison_recording(tmp_path / "both.rrd", found)
     done = subprocess.run(
         [sys.executable, "-m", "rerun", "rrd", "verify", tmp_path / "both.rrd"], capture_output=True, text=True
@@ -247,10 +263,7 @@ def test_the_recording_holds_both(tmp_path: Path):
     assert done.returncode == 0, done.stdout + done.stderr
 
     def rows(entity: str, component: str) -> Array:
-        stream = RrdReader(tmp_path / "both.rrd").stream().filter(content=entity, is_static=False, components=component)
-        batches = [chunk.to_record_batch() for chunk in stream.to_chunks()]
-        batches.sort(key=lambda batch: batch.column("t")[0].value)
-        return np.array([row for batch in batches for row in batch.column(component).to_pylist()])
+        return np.array(recorded_rows(tmp_path / "both.rrd", entity, component))
 
     for place, motion in (("boom", found.measured), ("planned", found.planned)):
         for name, T in body_transforms(BOOM, motion.q).items():
@@ -268,10 +281,10 @@ def test_the_recording_holds_both(tmp_path: Path):
 
 
 @pytest.fixture
-def boom(boom):
+def boom(boom, planned: Trajectory, finer: Move):
     """The command, in a folder with a plan and a log."""
-    write_csv(MOVE, "move.csv", FINE.loads.tau[: MOVE.t.size])
-    write_log(Path("log.csv"), MOVE.t + 30.0, noisy(MOVE.t, MOVE.q))
+    write_csv(planned, "move.csv", finer.loads.tau[: planned.t.size])
+    write_log(Path("log.csv"), planned.t + 30.0, noisy(planned.t, planned.q))
     return boom
 
 
@@ -279,8 +292,13 @@ def test_compare_prints_a_table_or_json_and_records(boom):
     code, out, err = boom("compare", "move.csv", "log.csv", "--offset", "best", "--out", "both.rrd")
     assert (code, err) == (0, "")
     assert Path("both.rrd").exists()
+    assert "tip error at most" in out
+    code, out, _ = boom("compare", "move.csv", "log.csv", "--offset", "best", "--all")
     assert "Savitzky-Golay filter over 21 samples" in out
-    assert "tip error: at most" in out
+    for tolerance, verdict, expected in (("0.01", "PASS", 0), ("0.0001", "FAIL", 1)):
+        code, out, err = boom("compare", "move.csv", "log.csv", "--offset", "best", "--tolerance", tolerance)
+        assert (code, f"{verdict}: tip error" in out) == (expected, True)
+        assert bool(err) == (expected == 1)
     code, out, _ = boom("compare", "move.csv", "log.csv", "--offset", "-30", "--json")
     answer = json.loads(out)
     assert (code, answer["offset_s"], answer["files"]) == (0, -30.0, {})

@@ -22,6 +22,7 @@ from planner.links.picture import write_link_picture
 from planner.links.report import to_json, to_markdown
 from planner.recording import write_link_recording
 from planner.validation.tables import table_3_1_motion
+from tests.recordings import recorded_entities
 
 BOOM = Boom.load()
 OPTIMISED = Body(
@@ -167,10 +168,7 @@ def test_picture_and_recording(new, tmp_path):
         [sys.executable, "-m", "rerun", "rrd", "verify", tmp_path / "r.rrd"], capture_output=True, check=False
     )
     assert verified.returncode == 0
-    from rerun.chunk import RrdReader
-
-    paths = {str(path) for path in RrdReader(tmp_path / "r.rrd").store().schema().entity_paths()}
-    assert {"/world/boom/inner/plates", "/plots/torque/inner", "/picture", "/report"} <= paths
+    assert {"/world/boom/inner/plates", "/plots/torque/inner", "/picture", "/report"} <= recorded_entities(tmp_path / "r.rrd")
 
 
 def test_the_command_as_json(boom, tmp_path):
@@ -198,7 +196,7 @@ def test_the_command_for_people_and_its_moves(boom):
 @pytest.mark.parametrize(
     ("options", "code", "message"),
     [
-        (("--deflection", "0"), 2, "deflection is 0 m; it must be between 1e-06 and 10 m"),
+        (("--deflection", "0"), 2, "deflection is 0 m; it must be between 1e-06 and 1 m"),
         (("--min-height", "0.2", "--max-height", "0.1"), 2, "minimum height 0.2 m is not below the maximum of 0.1 m"),
         (("--slices", "1"), 2, "slices is 1; it must be a whole number of at least 2"),
         (("--safety-factor", "nan"), 2, "safety factor is nan"),

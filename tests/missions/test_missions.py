@@ -14,7 +14,7 @@ from planner.motion.vehicle import load_case
 from planner.planning import torques
 from planner.timing.profile import Profile
 from planner.timing.travel_mean import average_torque
-from tests.field_day import field_day
+from tests.builders import main_move, planned_mission, row, without_drives
 
 BOOM = Boom.load()
 HEAD = 'name = "mine"\nbasis = "assumed"\nsource = "this test"\nstart = "transport"\n'
@@ -54,7 +54,7 @@ def mission(tmp_path):
 
 @pytest.mark.parametrize("profile", list(Profile))
 def test_a_mission_of_one_move_is_the_move(mission, profile):
-    move = plan(BOOM, "transport", "phenotyping", profile=profile)
+    move = main_move(profile)
     cycle = plan_cycle(BOOM, mission(f'[[steps]]\nto = "phenotyping"\nprofile = "{profile}"\n'))
     report = check_cycle(BOOM, cycle)
     assert report.rows == move.report.rows
@@ -106,7 +106,7 @@ def test_doing_it_again_changes_no_mean(mission):
 
 def test_legs_go_on_from_each_other(mission):
     for name in named_missions():
-        cycle = plan_cycle(BOOM, load_mission(name))
+        cycle = planned_mission(name)
         ends = [(cycle.legs[i].trajectory.q[0], cycle.legs[i].trajectory.q[-1]) for i in cycle.order]
         for (_, end), (start, _) in pairwise(ends):
             np.testing.assert_allclose(start, end, rtol=0, atol=1e-8)
@@ -115,7 +115,7 @@ def test_legs_go_on_from_each_other(mission):
 
 
 def test_the_field_day_sweeps_its_plots():
-    cycle = field_day()
+    cycle = planned_mission("field-day")
     sweeps = {leg.label: (n, leg) for leg, n in zip(cycle.legs, cycle.counts, strict=True) if "line" in leg.label}
     assert {n for n, _ in sweeps.values()} == {20}
     for _, leg in sweeps.values():
@@ -153,9 +153,8 @@ def test_the_thesis_moves_are_missions(name, duration):
 @pytest.mark.parametrize(("joint", "by_hand"), [("inner", 102.0), ("lower", 105.3)])
 def test_average_torque_of_table_2_4(joint, by_hand):
     """The thesis's load: the payload as a force."""
-    rows = check_cycle(BOOM, plan_cycle(BOOM, load_mission("table-2-4")), payload_as="force").rows
-    row = next(r for r in rows if (r.joint, r.check) == (joint, "gearbox average"))
-    assert row.demand == pytest.approx(by_hand, abs=0.05)
+    rows = check_cycle(BOOM, planned_mission("table-2-4"), payload_as="force").rows
+    assert row(rows, "gearbox average", joint).demand == pytest.approx(by_hand, abs=0.05)
 
 
 @pytest.mark.parametrize("k", [1.5, 4.0])
@@ -172,20 +171,19 @@ def test_a_stretched_cycle_moves_slower_and_stands_as_long(mission, k):
 def test_life_and_tolerance_are_asked_for_in_the_file(mission):
     head = HEAD + "required_life_h = 500\ntip_tolerance_mm = 4\n"
     cycle = plan_cycle(BOOM, mission('[[steps]]\nto = "phenotyping"\n', head))
-    rows = {(row.joint, row.check): row for row in check_cycle(BOOM, cycle).rows}
-    assert rows["inner", "gearbox life"].demand == 500 * 3600.0
-    tip = rows["tip", "deflection in all"]
+    rows = check_cycle(BOOM, cycle).rows
+    assert row(rows, "gearbox life", "inner").demand == 500 * 3600.0
+    tip = row(rows, "deflection in all", "tip")
     assert (tip.limit, tip.verdict) == (0.004, Verdict.FAIL)  # 4.5 mm of it are known already
     wider = replace(cycle.duty, tip_tolerance=replace(cycle.duty.tip_tolerance, value=0.006))
-    report = check(BOOM, cycle.trajectory, duty=wider)
-    row = next(r for r in report.rows if r.check == "deflection in all")
-    assert row.verdict is Verdict.NOT_CHECKABLE  # three joints have no drive, and may deflect too
     full = replace(BOOM, drives=(BOOM.drives[1],) * 5)
-    row = next(r for r in check(full, cycle.trajectory, duty=wider).rows if r.check == "deflection in all")
-    assert row.verdict is Verdict.PASS
-    none = replace(BOOM, drives=(None,) * 5)
-    row = next(r for r in check(none, cycle.trajectory, duty=wider).rows if r.joint == "tip")
-    assert row.verdict is Verdict.NOT_CHECKABLE
+    booms = (
+        (BOOM, Verdict.NOT_CHECKABLE),  # three joints have no drive, and may deflect too
+        (full, Verdict.PASS),
+        (without_drives(BOOM), Verdict.NOT_CHECKABLE),
+    )
+    for boom, verdict in booms:
+        assert row(check(boom, cycle.trajectory, duty=wider).rows, "deflection in all", "tip").verdict is verdict
 
 
 def test_a_step_to_where_it_stands_moves_nothing(mission):
@@ -224,7 +222,7 @@ def test_a_bad_mission_names_file_and_key(mission, steps, said):
             InfeasibleError,
             "mission mine, steps 2: duration",
         ),
-        ('[[steps]]\nto = "phenotyping"\nprofile = "fast"\n', InputError, "steps 1: profile is 'fast'"),
+        ('[[steps]]\nto = "phenotyping"\nprofile = "fast"\n', InputError, "steps 1: unknown profile 'fast'"),
         ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2"]\n', InputError, "steps 1: "),
         ('[[steps]]\nto = "phenotyping"\nvia_velocity = ["1,2,3,0,0"]\n', InputError, "via velocity: 1 given for 0 via"),
         ('[[steps]]\nrepeat = 1\n[[steps.steps]]\nto = "tip=9,0,0"\n', InfeasibleError, "steps 1, steps 1: tip"),
@@ -251,8 +249,7 @@ def test_a_mission_stands_on_a_slope_at_most(mission):
     slope = load_case("slope")
     report = check_cycle(BOOM, plan_cycle(BOOM, standing, slope), vehicle=slope)
     assert "vehicle case slope" in " ".join(report.notes)
-    hold = next(row for row in report.rows if row.check == "drive worst hold")
-    assert hold.demand > 1.0
+    assert row(report.rows, "drive worst hold").demand > 1.0
     for case in ("track", "shock"):
         with pytest.raises(InputError, match=f"vehicle case {case}: a mission can be on a slope only"):
             plan_cycle(BOOM, standing, load_case(case))

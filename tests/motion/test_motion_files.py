@@ -10,13 +10,18 @@ import pytest
 import yaml
 from pyarrow import parquet
 
-from boom_model import JOINTS, Boom, InputError
-from planner import Trajectory, plan
+from boom_model import JOINTS, InputError
+from planner import Move, Trajectory
 from planner.motion.motion_files import UNITS, read_motion, read_quantities, write_joint_trajectory, write_motion
 from planner.motion.trajectory import COLUMNS, TORQUES, read_csv, write_csv
+from tests.builders import main_move
 
-MOVE = plan(Boom.load(), "transport", "phenotyping", profile="jerk-limited")
 PARTS = {"positions": "q", "velocities": "qd", "accelerations": "qdd"}
+
+
+@pytest.fixture
+def move() -> Move:
+    return main_move("jerk-limited")
 
 
 def read_message(path: Path) -> Any:
@@ -25,13 +30,13 @@ def read_message(path: Path) -> Any:
     return yaml.load(path.read_text(), Loader=yaml.CSafeLoader)
 
 
-def test_parquet_brings_back_every_bit_and_its_units(tmp_path: Path):
-    write_motion(MOVE.trajectory, tmp_path / "move.parquet", MOVE.loads.tau)
+def test_parquet_brings_back_every_bit_and_its_units(tmp_path: Path, move: Move):
+    write_motion(move.trajectory, tmp_path / "move.parquet", move.loads.tau)
     back = read_motion(tmp_path / "move.parquet")
     for name in ("t", "q", "qd", "qdd"):
-        np.testing.assert_array_equal(getattr(back, name), getattr(MOVE.trajectory, name))
+        np.testing.assert_array_equal(getattr(back, name), getattr(move.trajectory, name))
     data, _ = read_quantities(tmp_path / "move.parquet")
-    np.testing.assert_array_equal(data["tau"], MOVE.loads.tau)
+    np.testing.assert_array_equal(data["tau"], move.loads.tau)
     schema = parquet.read_schema(tmp_path / "move.parquet")
     assert schema.names == [*COLUMNS, *TORQUES]
     units = {field.name: field.metadata[b"unit"].decode() for field in schema}
@@ -41,8 +46,8 @@ def test_parquet_brings_back_every_bit_and_its_units(tmp_path: Path):
     assert units == UNITS
 
 
-def test_parquet_remembers_where_derivatives_come_from(tmp_path: Path):
-    columns = [MOVE.trajectory.t, *MOVE.trajectory.q.T]
+def test_parquet_remembers_where_derivatives_come_from(tmp_path: Path, move: Move):
+    columns = [move.trajectory.t, *move.trajectory.q.T]
     parquet.write_table(pa.table([np.ascontiguousarray(c) for c in columns], names=COLUMNS[:6]), tmp_path / "q.parquet")
     fitted = read_motion(tmp_path / "q.parquet")
     assert "spline" in fitted.notes[0]
@@ -50,8 +55,9 @@ def test_parquet_remembers_where_derivatives_come_from(tmp_path: Path):
     assert read_motion(tmp_path / "fitted.parquet").notes == fitted.notes
 
 
-def table_of(tmp_path: Path) -> pa.Table:
-    write_motion(MOVE.trajectory, tmp_path / "good.parquet")
+@pytest.fixture
+def table(tmp_path: Path, move: Move) -> pa.Table:
+    write_motion(move.trajectory, tmp_path / "good.parquet")
     return parquet.read_table(tmp_path / "good.parquet")
 
 
@@ -73,8 +79,8 @@ def with_column(table: pa.Table, name: str, values: Any, unit: str | None = None
         (lambda t: t.take([1, 0]), "times must increase"),
     ],
 )
-def test_malformed_parquet_is_refused_with_the_reason(edit: Any, message: str, tmp_path: Path):
-    parquet.write_table(edit(table_of(tmp_path)), tmp_path / "bad.parquet")
+def test_malformed_parquet_is_refused_with_the_reason(edit: Any, message: str, tmp_path: Path, table: pa.Table):
+    parquet.write_table(edit(table), tmp_path / "bad.parquet")
     with pytest.raises(InputError, match=message) as caught:
         read_motion(tmp_path / "bad.parquet")
     assert "bad.parquet" in str(caught.value)
@@ -95,10 +101,10 @@ def test_what_is_no_parquet_is_refused(tmp_path: Path):
 
 
 @pytest.mark.parametrize("form", ["yaml", "yml", "json"])
-@pytest.mark.parametrize("tau", [None, MOVE.loads.tau], ids=["no torques", "torques"])
-def test_joint_trajectory_is_the_motion(form: str, tau: Any, tmp_path: Path):
-    path = tmp_path / f"move.{form}"
-    write_motion(MOVE.trajectory, path, tau)
+@pytest.mark.parametrize("torques", [False, True], ids=["no torques", "torques"])
+def test_joint_trajectory_is_the_motion(form: str, torques: bool, tmp_path: Path, move: Move):
+    path, tau = tmp_path / f"move.{form}", move.loads.tau if torques else None
+    write_motion(move.trajectory, path, tau)
     message = read_message(path)
     assert list(message) == ["header", "joint_names", "points"]
     assert message["header"] == {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "mount"}
@@ -109,12 +115,12 @@ def test_joint_trajectory_is_the_motion(form: str, tau: Any, tmp_path: Path):
     for key, name in expected.items():
         numbers = [point[key] for point in points]
         assert all(type(x) is float for row in numbers for x in row)  # ROS takes no int for a float64
-        np.testing.assert_array_equal(numbers, tau if name == "tau" else getattr(MOVE.trajectory, name))
+        np.testing.assert_array_equal(numbers, tau if name == "tau" else getattr(move.trajectory, name))
     times = [point["time_from_start"] for point in points]
     assert all(type(x) is int for time in times for x in time.values())
     assert all(0 <= time["nanosec"] < 10**9 for time in times)
     since = [time["sec"] + time["nanosec"] * 1e-9 for time in times]
-    np.testing.assert_allclose(since, MOVE.trajectory.t, rtol=0, atol=0.6e-9)
+    np.testing.assert_allclose(since, move.trajectory.t, rtol=0, atol=0.6e-9)
 
 
 @pytest.mark.parametrize("form", ["yaml", "json"])
@@ -130,11 +136,11 @@ def test_awkward_numbers_stay_numbers(form: str, tmp_path: Path):
     assert points[1]["time_from_start"] == {"sec": 3, "nanosec": 500_000_000}
 
 
-def test_batches_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_batches_join_without_a_seam(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, move: Move):
     whole, parts = tmp_path / "whole.json", tmp_path / "parts.json"
-    write_joint_trajectory(MOVE.trajectory, whole)
+    write_joint_trajectory(move.trajectory, whole)
     monkeypatch.setattr("planner.motion.motion_files._ROWS", 7)
-    write_joint_trajectory(MOVE.trajectory, parts)
+    write_joint_trajectory(move.trajectory, parts)
     assert json.loads(whole.read_text()) == json.loads(parts.read_text())
 
 
@@ -146,19 +152,19 @@ def test_times_that_ros_cannot_hold_are_refused(t: list[float], message: str, tm
     assert list(tmp_path.iterdir()) == []
 
 
-def test_another_ending_is_refused(tmp_path: Path):
+def test_another_ending_is_refused(tmp_path: Path, move: Move):
     with pytest.raises(InputError, match=r"must end in one of \.csv, \.parquet"):
-        write_motion(MOVE.trajectory, tmp_path / "move.txt")
+        write_motion(move.trajectory, tmp_path / "move.txt")
 
 
-def test_a_file_of_any_other_name_is_read_as_csv(tmp_path: Path):
-    write_csv(MOVE.trajectory, tmp_path / "move.log")
+def test_a_file_of_any_other_name_is_read_as_csv(tmp_path: Path, move: Move):
+    write_csv(move.trajectory, tmp_path / "move.log")
     np.testing.assert_array_equal(read_motion(tmp_path / "move.log").q, read_csv(tmp_path / "move.log").q)
 
 
-def test_torques_matter_to_those_who_ask_for_them(tmp_path: Path):
-    table = table_of(tmp_path).append_column("tau1", pa.array(np.full(MOVE.trajectory.t.size, np.nan)))
+def test_torques_matter_to_those_who_ask_for_them(tmp_path: Path, table: pa.Table, move: Move):
+    table = table.append_column("tau1", pa.array(np.full(move.trajectory.t.size, np.nan)))
     parquet.write_table(table, tmp_path / "nan.parquet")
-    np.testing.assert_array_equal(read_motion(tmp_path / "nan.parquet").q, MOVE.trajectory.q)
+    np.testing.assert_array_equal(read_motion(tmp_path / "nan.parquet").q, move.trajectory.q)
     with pytest.raises(InputError, match="lacks the column tau2, tau3, tau4, tau5"):
         read_quantities(tmp_path / "nan.parquet")

@@ -8,6 +8,7 @@ import pytest
 from boom_model import Basis, Boom, InputError, Origin, inverse_dynamics
 from planner import Verdict, check, plan
 from planner.motion.vehicle import LEVEL, VehicleCase, base_motion, base_pose, load_case, named_cases
+from tests.builders import row_of
 
 BOOM = Boom.load()
 MADE_UP = Origin(Basis.ASSUMED, "made up")
@@ -20,10 +21,6 @@ def turning(R, R_rate):
     """Angular velocity along the moving axes, from R^T R'."""
     spin = np.swapaxes(R, -1, -2) @ R_rate
     return np.stack([spin[..., 2, 1], spin[..., 0, 2], spin[..., 1, 0]], axis=-1)
-
-
-def rows_of(report, joint, name):
-    return next(row for row in report.rows if (row.joint, row.check) == (joint, name))
 
 
 def test_motion_is_the_derivative_of_the_pose():
@@ -102,25 +99,25 @@ def test_static_rows_take_the_tilt_and_not_the_shock():
     q = BOOM.pose("phenotyping")
     still = plan(BOOM, q, q, vehicle=SLOPE).report
     tilted = inverse_dynamics(BOOM, q, np.zeros(5), np.zeros(5), base=base_motion(SLOPE, 0.0)).tau
-    assert rows_of(still, "yaw", "drive worst hold").demand == pytest.approx(abs(tilted[0]), rel=1e-12)
+    assert row_of(still, "yaw", "drive worst hold").demand == pytest.approx(abs(tilted[0]), rel=1e-12)
     assert abs(tilted[0]) > 10.0  # on level ground the yaw holds nothing
     calm, shaken = (plan(BOOM, "transport", "phenotyping", vehicle=v).report for v in (LEVEL, SHOCK))
-    assert rows_of(calm, "inner", "gearbox hold").demand == pytest.approx(
-        rows_of(shaken, "inner", "gearbox hold").demand, rel=1e-6
+    assert row_of(calm, "inner", "gearbox hold").demand == pytest.approx(
+        row_of(shaken, "inner", "gearbox hold").demand, rel=1e-6
     )
 
 
 def test_shock_is_held_against_the_momentary_peak_torque_alone():
     level, shaken = (plan(BOOM, "transport", "phenotyping", vehicle=v) for v in (LEVEL, SHOCK))
     assert not any(row.check == "gearbox momentary peak" for row in level.report.rows)
-    momentary, repeated = (rows_of(shaken.report, "inner", f"gearbox {name} peak") for name in ("momentary", "repeated"))
+    momentary, repeated = (row_of(shaken.report, "inner", f"gearbox {name} peak") for name in ("momentary", "repeated"))
     base = base_motion(SHOCK, 1.1)
     q, qd, qdd, _ = shaken.motions[0](1.1)
     assert momentary.demand == pytest.approx(inverse_dynamics(BOOM, q, qd, qdd, base=base).tau[1], rel=3e-3)
     assert momentary.limit == 751.0
     assert momentary.verdict is Verdict.FAIL
     assert momentary.basis is Basis.ASSUMED
-    assert repeated.demand == pytest.approx(rows_of(level.report, "inner", "gearbox repeated peak").demand, rel=1e-6)
+    assert repeated.demand == pytest.approx(row_of(level.report, "inner", "gearbox repeated peak").demand, rel=1e-6)
     assert repeated.verdict is Verdict.PASS
 
 
@@ -131,7 +128,7 @@ def test_a_case_says_how_often_its_shock_comes(tmp_path):
     silent, often = load_case("shock"), load_case(str(tmp_path / "often.toml"))
     assert (silent.shock_events, often.shock_events) == (None, 20000.0)
     rows = [
-        rows_of(plan(BOOM, "transport", "phenotyping", vehicle=v).report, "inner", "gearbox momentary peaks")
+        row_of(plan(BOOM, "transport", "phenotyping", vehicle=v).report, "inner", "gearbox momentary peaks")
         for v in (silent, often)
     ]
     assert [row.verdict for row in rows] == [Verdict.NOT_CHECKABLE, Verdict.FAIL]
@@ -144,14 +141,14 @@ def test_a_case_says_how_often_its_shock_comes(tmp_path):
 )
 def test_a_shock_that_the_motion_does_not_hold_is_not_checkable(shock, resolved):
     report = plan(BOOM, "transport", "phenotyping", vehicle=replace(SHOCK, **shock)).report
-    verdict = rows_of(report, "inner", "gearbox momentary peak").verdict
+    verdict = row_of(report, "inner", "gearbox momentary peak").verdict
     assert (verdict is not Verdict.NOT_CHECKABLE) == resolved
 
 
 def test_a_shock_between_the_samples_of_a_file_is_not_checkable():
     coarse = replace(plan(BOOM, "transport", "phenotyping", step=0.1).trajectory, planned=None)
     report = check(BOOM, coarse, vehicle=SHOCK)
-    assert rows_of(report, "inner", "gearbox momentary peak").verdict is Verdict.NOT_CHECKABLE
+    assert row_of(report, "inner", "gearbox momentary peak").verdict is Verdict.NOT_CHECKABLE
 
 
 def test_plan_knows_the_slope():
@@ -159,7 +156,7 @@ def test_plan_knows_the_slope():
     heavy = BOOM.with_payload(20.0)
     level, steep = (plan(heavy, "transport", "phenotyping", profile="time-optimal", vehicle=v) for v in (LEVEL, SLOPE))
     assert abs(steep.report.duration - level.report.duration) > 1e-3
-    row = rows_of(steep.report, "lower", "motor torque")
+    row = row_of(steep.report, "lower", "motor torque")
     assert row.margin >= 0.5 - 1e-3
 
 

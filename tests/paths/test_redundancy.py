@@ -8,6 +8,7 @@ import pytest
 from boom_model import (
     ActuatorAngle,
     Boom,
+    Constraint,
     FixedExtension,
     InfeasibleError,
     InputError,
@@ -22,11 +23,14 @@ from boom_model import (
 )
 from planner import MoveSpec, plan
 from planner.checks.certificate import certify
+from planner.paths.path import Path
 from planner.paths.redundancy import NODES
 from planner.paths.tip_curves import TipLine
 from planner.paths.tip_path import follow
 from planner.planning import plan_motion
-from planner.timing.timing import Timing, timed
+from planner.timing.time_law import Motion
+from planner.timing.timing import Timing
+from tests.builders import motion_along
 
 BOOM = Boom.load()
 DOWN = -np.pi / 2.0
@@ -49,7 +53,14 @@ def lines() -> list[TipLine]:
     return found
 
 
-def simple(line: TipLine) -> list:
+@cache
+def resolved(number: int, constraint: Constraint) -> Path:
+    """The path along a line of `lines` under a constraint."""
+    return follow(BOOM, lines()[number], DOWN, constraint)
+
+
+@cache
+def simple(line: TipLine) -> list[Path]:
     """The paths along a line with the actuator's elevation or extension fixed."""
     paths = []
     fixed = [ActuatorAngle(angle) for angle in np.radians(np.linspace(-150.0, 0.0, 7))]
@@ -61,10 +72,17 @@ def simple(line: TipLine) -> list:
     return paths
 
 
-def duration(path, profile: str, *, certified: bool = False) -> float:
-    (motion,) = timed(BOOM, [path], Timing.of(profile), None)
-    if not certified:
-        return motion.duration
+@cache
+def moved(path: Path, profile: str) -> Motion:
+    return motion_along(BOOM, path, Timing.of(profile))
+
+
+def duration(path: Path, profile: str) -> float:
+    return moved(path, profile).duration
+
+
+def certified_duration(path: Path, profile: str) -> float:
+    motion = moved(path, profile)
     ratios = {worst.limit: worst.ratio for worst in certify(BOOM, [motion]).worst}
     assert max(ratios.get(limit, 0.0) for limit in JOINT_LIMITS) <= 1.001
     return motion.duration
@@ -76,20 +94,19 @@ def test_a_choosing_constraint_is_nearly_as_quick_as_the_quickest_simple_curve(n
     fixed = simple(line)
     quickest = {profile: min(duration(path, profile) for path in fixed) for profile in PROFILES}
     for constraint in CHOOSING:
-        path = follow(BOOM, line, DOWN, constraint)
+        path = resolved(number, constraint)
         s = np.linspace(0.0, 1.0, 2001)
         assert np.linalg.norm(forward_kinematics(BOOM, path(s)).position - line(s), axis=-1).max() < 1e-5
         for profile in PROFILES:
-            lasts = duration(path, profile, certified=True)
+            lasts = certified_duration(path, profile)
             assert lasts <= 1.5 * quickest[profile], (constraint, profile)
             assert lasts <= 30.0 or quickest[profile] >= 20.0
 
 
 @pytest.mark.parametrize("number", range(2))
 def test_least_time_is_the_quickest(number):
-    line = lines()[number]
-    others = [*simple(line), *(follow(BOOM, line, DOWN, constraint) for constraint in CHOOSING)]
-    mine = duration(follow(BOOM, line, DOWN, LeastTime()), "time-optimal")
+    others = [*simple(lines()[number]), *(resolved(number, constraint) for constraint in CHOOSING)]
+    mine = duration(resolved(number, LeastTime()), "time-optimal")
     assert mine <= 1.02 * min(duration(path, "time-optimal") for path in others)
 
 
@@ -110,8 +127,7 @@ def test_the_line_that_took_two_minutes():
 
 @pytest.mark.parametrize("constraint", CHOOSING, ids=str)
 def test_the_departure_that_a_path_tells_is_the_one_it_has(constraint):
-    line = lines()[0]
-    path = follow(BOOM, line, DOWN, constraint)
+    line, path = lines()[0], resolved(0, constraint)
     s = np.linspace(0.0, 1.0, NODES)
     q, chosen = path(s), solve_branches(BOOM, line(s), DOWN, constraint)
     side = int(np.argmin(np.abs(np.nan_to_num(chosen.q[0, :, 0], nan=9.0) - q[0, 0])))
@@ -132,5 +148,5 @@ def test_a_line_starts_where_the_move_before_it_ended():
 
 
 def test_least_time_of_a_single_target_is_refused():
-    with pytest.raises(InputError, match="least-time chooses along a line or an arc of the tip"):
+    with pytest.raises(InputError, match="constraint least-time needs a line or an arc of the tip"):
         plan(BOOM, "transport", "tip=1.4,0,1.0", constraint="least-time")

@@ -344,7 +344,7 @@ def test_a_leg_of_no_length_is_left_out():
         ({"along": "line", "via": [(1.5, 1.0, 3.0, 0.3, 0.0)]}, "is not a tip target"),
         ({"along": "line", "pitch": None}, "has a constant pitch, which must be given"),
         ({"along": (0.0, 1.6, 1.0), "pitch": None}, "has a constant pitch, which must be given"),
-        ({"along": "spiral"}, "along 'spiral' is not known; there are: joint, line, arc=X,Y,Z"),
+        ({"along": "spiral"}, "unknown along 'spiral'; there are: joint, line, arc=X,Y,Z"),
         ({"along": (0.0, 1.4, 1.0)}, "lies on a line with start and goal"),
         ({"along": (0.0, np.nan, 1.0)}, r"via\[1\] is nan"),
         ({"along": (0.0, 1.0)}, "via has shape"),

@@ -1,7 +1,5 @@
 """Moves through waypoints without a stop, on every profile."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -10,6 +8,7 @@ from planner import Cubic, TipTarget, plan
 from planner.paths.path import JointLine, SplinePath, spaced, through
 from planner.timing.profile import Profile, parse_profile
 from planner.timing.timing import Timing, timed
+from tests.builders import without_drives
 from tests.limits import ratios, worst
 
 BOOM = Boom.load()
@@ -88,7 +87,7 @@ def test_cubic_through_waypoints_is_no_slower_than_with_knots_in_proportion_to_t
     middle, half = (LIMITS.lower + LIMITS.upper) / 2.0, (LIMITS.upper - LIMITS.lower) / 2.0
     waypoints = middle + 0.5 * half * rng.uniform(-1.0, 1.0, (4, 5))
     waypoints[:, 2] = np.maximum(waypoints[:, 2], waypoints[:, 1] + 0.6)
-    bare = replace(BOOM, drives=(None,) * 5)
+    bare = without_drives(BOOM)
     (motion,) = timed(bare, [SplinePath(None, waypoints)], Timing.of("cubic"), None)
     chords = np.linalg.norm(np.diff(waypoints, axis=0), axis=1)
     s = np.linspace(0.0, 1.0, 20_001)

@@ -27,6 +27,8 @@ from boom_model.provenance import Basis, Origin
 from planner.motion.vehicle import base_pose, load_case
 from planner.planning import Move, plan
 from planner.recording import write_recording
+from tests.builders import without_drives
+from tests.recordings import recorded_entities, recorded_rows
 
 BOOM = Boom.load()
 FLOAT32 = 5e-7  # of positions up to 3 m and of rotations, once rounded to float32
@@ -47,11 +49,7 @@ class Recorded:
 
     def rows(self, entity: str, component: str, static: bool = False) -> list[Any]:
         """A component's rows, in order of time."""
-        stream = RrdReader(self.path).stream().filter(content=entity, is_static=static, components=component)
-        batches = [chunk.to_record_batch() for chunk in stream.to_chunks()]
-        times = [0] * len(batches) if static else [batch.column("t")[0].value for batch in batches]
-        ordered = [batch for _, batch in sorted(zip(times, batches, strict=True), key=lambda pair: pair[0])]
-        return [row for batch in ordered for row in batch.column(component).to_pylist()]
+        return recorded_rows(self.path, entity, component, static)
 
     def static(self, entity: str, component: str) -> Any:
         (row,) = self.rows(entity, component, static=True)
@@ -67,7 +65,7 @@ class Recorded:
         return np.array(self.rows(entity, "Scalars:scalars"))
 
     def entities(self) -> set[str]:
-        return set(RrdReader(self.path).store().schema().entity_paths())
+        return recorded_entities(self.path)
 
     def poses(self, entity: str) -> Array:
         T = np.zeros((len(self.move.trajectory.t), 4, 4))
@@ -154,7 +152,7 @@ def test_the_tips_budget_and_the_drives_page_are_there(recorded: Recorded):
 
 
 def test_a_boom_without_motors_has_no_page(tmp_path: Path):
-    bare = replace(BOOM, drives=(None,) * 5)
+    bare = without_drives(BOOM)
     recording = Recorded(tmp_path / "bare.rrd", plan(bare, "transport", "phenotyping", step=0.1))
     write(recording.path, recording.move)
     assert not [name for name in recording.entities() if "drives" in name or "motor" in name]
@@ -233,19 +231,19 @@ def test_series_say_what_they_are_in_which_unit_and_what_is_assumed(recorded: Re
             mark = " (assumed)" if BOOM.limits.origins[name][i].basis is Basis.ASSUMED else ""
             assert recorded.static(f"/plots/{quantity}/{joint}", "SeriesLines:names") == [f"{joint} {name} {unit}"]
             limits = recorded.static(f"/plots/{quantity}/{joint}/limits", "SeriesLines:names")
-            assert limits == [f"lower limit {unit}{mark}", f"upper limit {unit}{mark}"]
+            assert limits == [f"minimum {unit}{mark}", f"maximum {unit}{mark}"]
     assert recorded.static("/plots/q/linkage", "SeriesLines:names") == ["lower - inner [deg]"]
-    assert recorded.static("/plots/q/linkage/limits", "SeriesLines:names") == ["lower limit [deg]"]
+    assert recorded.static("/plots/q/linkage/limits", "SeriesLines:names") == ["minimum [deg]"]
     assert recorded.static("/plots/tau/extension", "SeriesLines:names") == ["extension force [N]"]
     assert recorded.static("/plots/tau/wrist", "SeriesLines:names") == ["wrist torque [Nm]"]
     assert recorded.static("/plots/tau/inner/limits", "SeriesLines:names") == [
-        "lower drive limit [Nm] (assumed)",  # by the assumed supply
-        "upper drive limit [Nm] (assumed)",
+        "drive minimum [Nm] (assumed)",  # by the assumed supply
+        "drive maximum [Nm] (assumed)",
     ]
 
 
 def test_assumed_position_limits_are_marked(standing: Recorded):
-    expected = ["lower limit [deg] (assumed)", "upper limit [deg] (assumed)"]
+    expected = ["minimum [deg] (assumed)", "maximum [deg] (assumed)"]
     assert standing.static("/plots/q/yaw/limits", "SeriesPoints:names") == expected
     assert standing.static("/plots/q/linkage/limits", "SeriesPoints:names") == expected[:1]
 
@@ -358,6 +356,9 @@ def blueprint(recording: Recorded) -> dict[str, list[Any]]:
     return found
 
 
+FIVE = {"Answer", "Torques", "Motion", "Drives", "Assumptions"}
+
+
 @pytest.mark.parametrize("which", ["recorded", "standing"])
 def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
     recording: Recorded = request.getfixturevalue(which)
@@ -366,17 +367,22 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
     plots = {e for e in recording.entities() if e.startswith("/plots/") and not e.endswith("/limits")}
     assert len(plots) == 4 * 5 + 1 + 1 + 5 + 2 + 1 + 3 * 2 + 1
     others = {"/world", "/legend", "/plane/inner", "/plane/lower", "/drives", "/checks", "/assumptions", "/report"}
+    others |= {"/answer", "/states", "/events"}
     assert sorted(origins) == sorted(plots | others)
     classes = [row[0] for row in shown["ViewBlueprint:class_identifier"]]
-    assert sorted(set(classes)) == ["2D", "3D", "TextDocument", "TimeSeries"]
+    assert sorted(set(classes)) == ["2D", "3D", "StateTimeline", "TextDocument", "TextLog", "TimeSeries"]
     names = dict(zip(origins, (row[0] for row in shown["ViewBlueprint:display_name"]), strict=True))
     style = "SeriesLines" if which == "recorded" else "SeriesPoints"  # no line goes through one sample
     for plot in plots:
         curves = recording.static(plot, f"{style}:names")
-        assert names[plot] == curves[0] if len(curves) == 1 else re.search(r"\[(N|Nm|mm|%|-)\]$", names[plot])
+        assert (
+            names[plot].removesuffix(", no drive limits it") == curves[0]
+            if len(curves) == 1
+            else re.search(r"\[(N|Nm|mm|%|-)\]$", names[plot])
+        )
     tabs = {row[0] for row in shown["ContainerBlueprint:display_name"]}
     joints, drives = {"Positions", "Velocities", "Accelerations"}, {"Torque-speed", "Margins", "Motors", "Gearboxes", "Tip"}
-    assert tabs == {"Torques", "Joints", "Torque parts", "Pins and mount", "Drives"} | joints | drives
+    assert tabs == FIVE | {"Torque parts", "Pins and mount"} | joints | drives
     assert shown["TimePanelBlueprint:timeline"] == [["t"]]
 
 
@@ -413,7 +419,7 @@ def test_old_recording_survives_a_failure_in_the_middle(recorded: Recorded, tmp_
     path.write_text("an old recording")
     move = recorded.move
     short = replace(move, trajectory=replace(move.trajectory, t=move.trajectory.t[:-1]))
-    with pytest.raises(ValueError, match="length"):
+    with pytest.raises(ValueError, match="broadcast"):
         write(path, short)
     assert path.read_text() == "an old recording"
     assert others(path) == []

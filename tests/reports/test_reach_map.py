@@ -26,6 +26,7 @@ from boom_model.kinematics.reach import reach_map
 from planner import cli
 from planner.recording import write_reach_recording
 from planner.reports.reach_picture import write_reach_picture
+from tests.builders import without_drives
 
 BOOM = Boom.load()
 G = BOOM.geometry
@@ -131,7 +132,7 @@ def test_least_torque_leaves_the_most_margin(constraint):
 
 
 def test_without_a_drive_no_margin_is_known():
-    bare = replace(BOOM, drives=(None,) * 5)
+    bare = without_drives(BOOM)
     found = reach_map(bare, ActuatorHorizontal(), DOWN, R, Z)
     assert found.within_limits.any()
     assert np.isnan(found.torque_margin).all()
@@ -161,7 +162,7 @@ def test_picture_and_recording_are_written(coarse, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("boom", [replace(BOOM, drives=(None,) * 5), BOOM.with_payload(60.0)], ids=["no drives", "overloaded"])
+@pytest.mark.parametrize("boom", [without_drives(BOOM), BOOM.with_payload(60.0)], ids=["no drives", "overloaded"])
 @pytest.mark.parametrize("r", [[1.2], [0.9, 1.2, 2.0]])
 def test_odd_maps_are_drawn(boom, r, tmp_path):
     found = reach_map(boom, FixedExtension(0.4), DOWN, r, [0.3, 0.8])

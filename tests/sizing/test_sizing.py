@@ -23,17 +23,24 @@ from planner.sizing.choice import (
     too_high,
 )
 from planner.sizing.tables import motors, outcome, ranking, saving, sizing_json, sizing_markdown, sizing_notes
-from tests.checks.test_actuator_checks import SCREW
-from tests.field_day import field_day
+from tests.builders import SCREW, STRONG_CATALOGUE, UNDERSIZED_MISSION, planned_mission, with_drives
 
 BOOM = Boom.load()
 CATALOGUE = Catalogue.load()
-CYCLE = field_day()
-MAIN = plan_cycle(BOOM, load_mission("table-3-1"))
 
 
-def sized(boom=BOOM, joint="inner", cycle=CYCLE, **kwargs):
-    return size(boom, cycle, joint, candidates(boom, joint, CATALOGUE), **kwargs)
+@pytest.fixture
+def cycle():
+    return planned_mission("field-day")
+
+
+@pytest.fixture
+def main():
+    return planned_mission("table-3-1")
+
+
+def sized(boom=BOOM, joint="inner", adapt=Adapt.NOTHING):
+    return size(boom, planned_mission("field-day"), joint, candidates(boom, joint, CATALOGUE), adapt=adapt)
 
 
 def test_candidates_are_every_motor_wiring_voltage_and_gearbox():
@@ -49,18 +56,18 @@ def test_candidates_are_every_motor_wiring_voltage_and_gearbox():
     assert {d.brake for d in found} == {BOOM.drives[1].brake}
 
 
-def test_without_a_voltage_anywhere_there_is_none_to_try():
-    bare = replace(BOOM, drives=tuple(d and replace(d, bus_voltage=None) for d in BOOM.drives))
+def test_without_a_voltage_anywhere_there_is_none_to_try(main):
+    bare = with_drives(BOOM, bus_voltage=None)
     found = candidates(bare, "lower", CATALOGUE)
     assert {d.bus_voltage for d in found} == {None}
-    judged = size(bare, MAIN, "lower", found)
+    judged = size(bare, main, "lower", found)
     assert all("motor torque" in j.unknown for j in judged if not j.fails)
 
 
-def test_every_row_is_the_checks_own():
+def test_every_row_is_the_checks_own(cycle):
     """A drive put on the boom and checked with the whole mission gives the rows that it was judged by."""
     for judged in sized(joint="lower"):
-        report = check_cycle(BOOM.with_drive("lower", judged.drive), CYCLE)
+        report = check_cycle(BOOM.with_drive("lower", judged.drive), cycle)
         rows = tuple(
             r
             for r in report.rows
@@ -108,11 +115,11 @@ def test_what_does_not_pass_says_why_and_nothing_passes_without_rows():
         ("payload=20", None, None),
     ],
 )
-def test_the_thesis_s_question(variant, inner, lower):
+def test_the_thesis_s_question(variant, inner, lower, cycle):
     """Which motor is the lightest that does not fail; 3.8, 2.8 and 1.8 kg are their masses."""
     boom = parse_variant(BOOM, variant)
     for joint, name in (("inner", inner), ("lower", lower)):
-        choice = Choice(variant, joint, fitted(boom, CYCLE, joint), sized(boom, joint))
+        choice = Choice(variant, joint, fitted(boom, cycle, joint), sized(boom, joint))
         if name is None:
             assert choice.lightest is None
             continue
@@ -122,20 +129,20 @@ def test_the_thesis_s_question(variant, inner, lower):
         assert choice.lightest.mass == pytest.approx(3.3 + 3.8 - saved, rel=1e-12)
 
 
-def test_rescaling_finds_the_least_factor_with_which_nothing_fails():
+def test_rescaling_finds_the_least_factor_with_which_nothing_fails(cycle):
     """A series winding falls short at speed: slowed it does, and a hundredth faster it does not."""
     series = [d for d in candidates(BOOM, "lower", CATALOGUE) if d.wiring.value is Wiring.SERIES]
-    plain = {j.name: j for j in size(BOOM, CYCLE, "lower", series)}
-    slowed = {j.name: j for j in size(BOOM, CYCLE, "lower", series, adapt=Adapt.RESCALE)}
+    plain = {j.name: j for j in size(BOOM, cycle, "lower", series)}
+    slowed = {j.name: j for j in size(BOOM, cycle, "lower", series, adapt=Adapt.RESCALE)}
     name = "MST341B02 + CBG320160"
     assert plain[name].fails
     assert not slowed[name].fails
     factor = slowed[name].moving / plain[name].moving
     assert 1.0 < factor < 3.0
     for share, passes in ((1.0, True), (0.985, False)):
-        slower = CYCLE.stretched(share * factor)
+        slower = cycle.stretched(share * factor)
         assert fitted(BOOM.with_drive("lower", slowed[name].drive), slower, "lower").fails is not passes
-    assert slowed[name].duration == pytest.approx(CYCLE.duty.duration + slowed[name].moving - plain[name].moving, rel=1e-9)
+    assert slowed[name].duration == pytest.approx(cycle.duty.duration + slowed[name].moving - plain[name].moving, rel=1e-9)
 
 
 def test_what_static_torque_forbids_no_slowness_mends():
@@ -164,46 +171,12 @@ def test_replanning_suits_the_moves_to_the_drive():
     assert outcome(heavy).startswith("FAIL: mission field day, steps 2")
 
 
-UNDERSIZED = """
-name = "quick"
-basis = "assumed"
-source = "this test"
-start = "transport"
-
-[[steps]]
-to = "phenotyping"
-profile = "time-optimal"
-"""
-STRONG = """
-[motors.BIG]
-source = "this test"
-step_deg = 1.8
-holding_torque_Nm = 40
-running_torque_Nm = 32
-mass_kg = 12
-rotor_inertia_kg_cm2 = 12
-parallel = { current_A = 20, resistance_ohm = 0.1, inductance_mH = 0.5 }
-
-[gearboxes.HUGE]
-source = "this test"
-ratio = 160
-continuous_torque_Nm = 1500
-max_average_torque_Nm = 1700
-start_stop_torque_Nm = 2000
-peak_torque_Nm = 4000
-efficiency_percent = 65
-no_load_input_torque_Nm = 0.5
-mass_kg = 20
-input_inertia_kg_m2 = 200e-6
-"""
-
-
 @pytest.fixture
 def undersized(tmp_path):
     """A mission that the fitted drive of lower cannot do with 30 kg, and a catalogue with one that can."""
     mission, catalogue = tmp_path / "quick.toml", tmp_path / "strong.toml"
-    mission.write_text(UNDERSIZED)
-    catalogue.write_text(STRONG)
+    mission.write_text(UNDERSIZED_MISSION)
+    catalogue.write_text(STRONG_CATALOGUE)
     return load_mission(str(mission)), CATALOGUE.with_file(catalogue)
 
 
@@ -292,7 +265,7 @@ def test_on_a_slope_the_rows_are_those_of_the_mission_on_the_slope(adapt):
         size(BOOM, cycle, "inner", drives, vehicle=load_case("shock"))
 
 
-def test_a_voltage_that_motors_do_not_allow_is_said():
+def test_a_voltage_that_motors_do_not_allow_is_said(main):
     assert too_high(CATALOGUE, (80.0, 165.0)) == ()
     assert too_high(CATALOGUE, (80.0, 200.0, 200.0)) == ("200 V exceeds the limit of every motor (at most 165 V)",)
     weak = replace(CATALOGUE.motors["MST340B02"], name="WEAK", max_voltage=60.0)
@@ -300,10 +273,10 @@ def test_a_voltage_that_motors_do_not_allow_is_said():
     assert too_high(mixed, (80.0,)) == ("80 V exceeds the limit of WEAK; it is not tried there",)
     open_ended = replace(CATALOGUE, motors={"ANY": replace(weak, max_voltage=None)})
     assert too_high(open_ended, (1000.0,)) == ()
-    (none,) = choose({"x": BOOM}, MAIN, ("inner",), CATALOGUE, (200.0,))
+    (none,) = choose({"x": BOOM}, main, ("inner",), CATALOGUE, (200.0,))
     assert none.unmet
     assert any("inner: NOT CHECKED, no drive of the catalogue is left" in note for note in sizing_notes((none,)))
-    (extension,) = choose({"x": BOOM}, MAIN, ("extension",), CATALOGUE, (200.0,))
+    (extension,) = choose({"x": BOOM}, main, ("extension",), CATALOGUE, (200.0,))
     assert not extension.unmet
 
 
@@ -322,21 +295,21 @@ def test_lighter_loads_never_lose_a_drive():
     assert not passing[-1]
 
 
-def test_the_extension_takes_actuators_alone():
+def test_the_extension_takes_actuators_alone(main):
     assert candidates(BOOM, "extension", CATALOGUE) == ()
     catalogue = replace(CATALOGUE, actuators={"SCREW": SCREW})
     found = candidates(BOOM, "extension", catalogue)
     assert found == (LinearDrive(SCREW),)
-    (judged,) = size(BOOM, MAIN, "extension", found)
+    (judged,) = size(BOOM, main, "extension", found)
     assert (judged.name, judged.mass, judged.supply) == ("SCREW", 4.0, "-")
     assert not any(row.check == "power-off hold" for row in judged.rows)
     assert judged.first_failing.check == "actuator duty"  # a lone move, without a pause
     assert BOOM.with_drive("extension", found[0]).actuator is found[0]
 
 
-def test_tables_say_what_was_chosen():
+def test_tables_say_what_was_chosen(cycle):
     booms = {"as it is": BOOM, "payload=5": parse_variant(BOOM, "payload=5")}
-    choices = choose(booms, CYCLE, ("inner", "extension"), CATALOGUE)
+    choices = choose(booms, cycle, ("inner", "extension"), CATALOGUE)
     rows = saving(choices)
     assert rows[0] == (
         "as it is", "inner", "MST342C02 + CBG320160 (parallel, 80 V), 7.1 kg",
@@ -378,11 +351,11 @@ def test_bad_input_is_named(call, said):
         call()
 
 
-def test_a_drive_without_a_mass_ranks_behind():
+def test_a_drive_without_a_mass_ranks_behind(cycle):
     heavy = CATALOGUE.motors["MST342C02"]
     unknown = replace(heavy, name="UNKNOWN", mass=None)
     drive = BOOM.drives[1]
-    judged = size(BOOM, CYCLE, "inner", [replace(drive, motor=unknown), drive])
+    judged = size(BOOM, cycle, "inner", [replace(drive, motor=unknown), drive])
     assert [j.drive.motor.name for j in judged] == ["MST342C02", "UNKNOWN"]
     assert judged[1].mass is None
     assert isinstance(judged[0].drive, Drive)

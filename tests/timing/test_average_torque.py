@@ -1,6 +1,7 @@
 """The time-optimal law within the gearboxes' average torque."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from boom_model import Boom, inverse_dynamics
 from planner import TimeOptimal, plan
 from planner.paths.path import JointLine
 from planner.timing.path_limits import InfeasiblePathError
-from planner.timing.timing import Timing, timed
+from planner.timing.timing import Timing
+from tests.builders import motion_along
 from tests.limits import times, worst
 
 BOOM = Boom.load().with_payload(15.0)
@@ -35,25 +37,36 @@ def averages(motion):
 
 
 def law(boom, **options):
-    (motion,) = timed(boom, [JointLine(START, GOAL)], Timing.of("time-optimal", **options), None)
-    return motion
+    return motion_along(boom, JointLine(START, GOAL), Timing.of("time-optimal", **options))
 
 
-SHARP = law(BOOM)
-PEAK = averages(SHARP)[1:3]
-SLOW = averages(law(BOOM, duration=1000.0 * SHARP.duration))[1:3]
+@cache
+def sharp():
+    """The motion without a limit to the average."""
+    return law(BOOM)
 
 
-def test_an_average_below_the_limit_changes_nothing():
-    assert law(limited(1.01 * PEAK.max()), average_torque=True).duration == SHARP.duration
-    assert law(limited(0.5 * PEAK.max())).duration == SHARP.duration  # not asked for
+@pytest.fixture
+def peak():
+    return averages(sharp())[1:3]
+
+
+@pytest.fixture
+def slow():
+    """The averages of a motion so slow that the load is merely held."""
+    return averages(law(BOOM, duration=1000.0 * sharp().duration))[1:3]
+
+
+def test_an_average_below_the_limit_changes_nothing(peak):
+    assert law(limited(1.01 * peak.max()), average_torque=True).duration == sharp().duration
+    assert law(limited(0.5 * peak.max())).duration == sharp().duration  # not asked for
 
 
 @pytest.mark.parametrize("share", [0.9, 0.3])
-def test_a_lower_limit_is_kept_and_no_slower_than_by_an_even_slowing(share):
-    joint = int(np.argmax(PEAK - SLOW))
-    limit = SLOW[joint] + share * (PEAK - SLOW)[joint]
-    assert limit > SLOW.max()
+def test_a_lower_limit_is_kept_and_no_slower_than_by_an_even_slowing(share, peak, slow):
+    joint = int(np.argmax(peak - slow))
+    limit = slow[joint] + share * (peak - slow)[joint]
+    assert limit > slow.max()
     boom = limited(float(limit))
     motion = law(boom, average_torque=True)
     assert averages(motion)[1:3].max() <= limit * (1.0 + 1e-4)
@@ -61,30 +74,30 @@ def test_a_lower_limit_is_kept_and_no_slower_than_by_an_even_slowing(share):
     found = worst(boom, motion, 5e-4)
     assert found.pop("outside") <= 1e-12
     assert max(found.values()) <= 1.001
-    quick, slow = 1.0, 1000.0
+    least, most = 1.0, 1000.0
     for _ in range(25):
-        middle = np.sqrt(quick * slow)
-        even = replace(SHARP, law=SHARP.law.stretched(middle))
-        quick, slow = (quick, middle) if averages(even)[1:3].max() <= limit else (middle, slow)
-    assert SHARP.duration < motion.duration <= SHARP.duration * slow * (1.0 + 1e-3)
+        middle = np.sqrt(least * most)
+        even = replace(sharp(), law=sharp().law.stretched(middle))
+        least, most = (least, middle) if averages(even)[1:3].max() <= limit else (middle, most)
+    assert sharp().duration < motion.duration <= sharp().duration * most * (1.0 + 1e-3)
 
 
 @pytest.mark.parametrize("share", [0.7])
-def test_the_jerk_bound_keeps_the_average_as_well(share):
-    joint = int(np.argmax(PEAK - SLOW))
-    limit = float(SLOW[joint] + share * (PEAK - SLOW)[joint])
+def test_the_jerk_bound_keeps_the_average_as_well(share, peak, slow):
+    joint = int(np.argmax(peak - slow))
+    limit = float(slow[joint] + share * (peak - slow)[joint])
     motion = law(limited(limit), average_torque=True, jerk_bound=True)
     assert averages(motion)[1:3].max() <= limit * (1.0 + 1e-4)
     t = times(motion, 1e-3)
     assert (np.abs(motion(t)[3]) / BOOM.limits.jerk).max() <= 1.001
 
 
-def test_a_load_whose_holding_alone_averages_too_much_is_refused_with_joint_and_limit():
-    limit = 0.95 * float(SLOW.max())
+def test_a_load_whose_holding_alone_averages_too_much_is_refused_with_joint_and_limit(slow):
+    limit = 0.95 * float(slow.max())
     with pytest.raises(
         InfeasiblePathError, match=r"at (inner|lower) the load that is held alone averages \d+\.\d Nm"
     ) as caught:
         plan(limited(limit), START, GOAL, profile=TimeOptimal(average_torque=True))
-    assert caught.value.joint == ("inner", "lower")[int(np.argmax(SLOW))]
-    assert caught.value.demand == pytest.approx(SLOW.max(), rel=1e-3)
+    assert caught.value.joint == ("inner", "lower")[int(np.argmax(slow))]
+    assert caught.value.demand == pytest.approx(slow.max(), rel=1e-3)
     assert caught.value.limit == limit

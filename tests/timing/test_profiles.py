@@ -1,23 +1,27 @@
 """Each profile against closed forms, against the limits on a fine grid, and in degenerate cases."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from boom_model import Boom, InfeasibleError, inverse_dynamics
+from boom_model.arrays import Array
 from boom_model.drives.drive import reflected_inertia
 from boom_model.drives.limits import motor_limits
-from planner import Cubic, TimeOptimal, plan
+from planner import Cubic, Move, TimeOptimal, plan
 from planner.motion.trajectory import sample
 from planner.paths.path import JointLine
 from planner.timing.path_limits import InfeasiblePathError
 from planner.timing.profile import Profile
-from planner.timing.timing import Timing, timed
+from planner.timing.timing import Timing
+from tests.builders import motion_along, without_drives
+from tests.limits import random_pairs
 
 BOOM = Boom.load()
 LIMITS = BOOM.limits
-BARE = replace(BOOM, drives=(None,) * 5)
+BARE = without_drives(BOOM)
 SLACK = 1.001
 VIA = np.array([0.7, 0.5, 2.0, 0.4, -0.2])
 
@@ -36,19 +40,15 @@ def worst_ratios(move):
     }
 
 
-def random_pairs(count: int):
-    rng = np.random.default_rng(20)
-    while count:
-        pair = rng.uniform(LIMITS.lower, LIMITS.upper, (2, 5))
-        if LIMITS.contain(pair).all():
-            count -= 1
-            yield pair
+@cache
+def random_moves(profile: Profile) -> list[tuple[Array, Move]]:
+    """(2, 5) start and goal, and the move between them."""
+    return [(pair, plan(BOOM, *pair, profile=profile)) for pair in random_pairs(BOOM, 40, 20)]
 
 
 def straight(boom, start, goal, profile, **options):
     """The motion alone, without the checks of a whole plan."""
-    (motion,) = timed(boom, [JointLine(start, goal)], Timing.of(profile, **options), None)
-    return motion
+    return motion_along(boom, JointLine(start, goal), Timing.of(profile, **options))
 
 
 def single_joint_move(joint: int, distance: float = 0.5):
@@ -117,7 +117,7 @@ def straight_pairs():
     for joint in range(5):
         for distance in (0.01, 0.16, 0.5):
             yield single_joint_move(joint, distance)
-    yield from random_pairs(10)
+    yield from random_pairs(BOOM, 10, 20)
 
 
 @pytest.mark.parametrize(("start", "goal"), list(straight_pairs()))
@@ -158,8 +158,7 @@ def test_jerk_bound_keeps_the_path_the_jerk_limits_and_the_rest():
 
 @pytest.mark.parametrize("profile", Profile)
 def test_random_moves_keep_every_limit(profile):
-    for start, goal in random_pairs(40):
-        move = plan(BOOM, start, goal, profile=profile)
+    for (start, goal), move in random_moves(profile):
         assert max(worst_ratios(move).values()) <= SLACK
         fine = sample(move.motions[0], 0.002)
         assert LIMITS.contain(fine.q).all()
@@ -171,9 +170,8 @@ def test_random_moves_keep_every_limit(profile):
 
 
 def test_time_optimal_is_no_slower_than_cubic():
-    for start, goal in random_pairs(40):
-        fast, slow = (plan(BOOM, start, goal, profile=p).report.duration for p in ("time-optimal", "cubic"))
-        assert fast <= slow * (1.0 + 1e-9)
+    for (_, fast), (_, slow) in zip(random_moves(Profile.TIME_OPTIMAL), random_moves(Profile.CUBIC), strict=True):
+        assert fast.report.duration <= slow.report.duration * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("payload", [16.0, 20.0, 24.0])

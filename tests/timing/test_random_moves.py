@@ -8,7 +8,8 @@ import pytest
 from boom_model import Boom, InfeasibleError
 from planner.paths.path import JointLine
 from planner.timing.profile import Profile
-from planner.timing.timing import Timing, timed
+from planner.timing.timing import Timing
+from tests.builders import motion_along
 from tests.limits import held, random_pairs, worst
 
 BOOM = Boom.load()
@@ -22,8 +23,7 @@ LIMITED = (Profile.JERK_LIMITED, "jerk bound")
 
 
 def motion_of(boom, start, goal, profile, options):
-    (motion,) = timed(boom, [JointLine(start, goal)], Timing.of(profile, **options), None)
-    return motion
+    return motion_along(boom, JointLine(start, goal), Timing.of(profile, **options))
 
 
 def assert_keeps_limits(boom, start, goal, motion, jerk, step):

@@ -20,11 +20,6 @@ PAYLOADS = pytest.mark.parametrize("payload_as", ["mass", "force"])
 SURROUNDINGS = pytest.mark.parametrize("surroundings", ["still", "constant", "varying"])
 
 
-@pytest.fixture(params=BOOMS)
-def boom(request: pytest.FixtureRequest) -> Boom:
-    return BOOMS[request.param]
-
-
 def motion(boom: Boom, count: int, seed: int, surroundings: str) -> tuple[tuple[Array, Array, Array], BaseMotion | None]:
     rng = np.random.default_rng(seed)
     states = random_states(boom, count, rng)

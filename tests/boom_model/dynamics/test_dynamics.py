@@ -48,11 +48,6 @@ PINS = ("frame_6", "frame_7", "frame_8")
 STILL = np.zeros(5)
 
 
-@pytest.fixture(params=BOOMS)
-def boom(request: pytest.FixtureRequest) -> Boom:
-    return BOOMS[request.param]
-
-
 def around(surroundings: str, count: int, rng: np.random.Generator) -> dict[str, Any]:
     """What moves the base and acts on the tip: nothing, the same for all samples, or other for each."""
     if surroundings == "still":

@@ -39,11 +39,6 @@ STILL = np.zeros(5)
 DRIVES = pytest.mark.parametrize("drive_inertia", [False, True], ids=["links", "links and drives"])
 
 
-@pytest.fixture(params=BOOMS)
-def boom(request: pytest.FixtureRequest) -> Boom:
-    return BOOMS[request.param]
-
-
 def states(boom: Boom, count: int, seed: int) -> tuple[Array, Array, Array]:
     return random_states(boom, count, np.random.default_rng(seed))
 

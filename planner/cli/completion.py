@@ -1,0 +1,108 @@
+"""Words and names that the shell completes, and words that an option may take."""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from boom_model import InputError
+from boom_model.words import unknown
+
+if TYPE_CHECKING:
+    _Text = click.ParamType[str]
+else:
+    _Text = click.ParamType  # not generic before click 8.2
+
+
+class OneOf(_Text):
+    """One of some words. For any other word, the error suggests the nearest."""
+
+    name = "word"
+
+    def __init__(self, words: Sequence[str]) -> None:
+        """Args: words: the words there are."""
+        self.words = tuple(words)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the word.
+
+        Raises:
+            InputError: there is no such word.
+        """
+        if value in self.words:
+            return str(value)
+        raise unknown("value" if param is None else str(param.name).replace("_", " "), value, self.words)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Return the words that begin so."""
+        return _items(self.words, incomplete)
+
+
+class OutFile(_Text):
+    """Name of a file to write, by the ending of which its form is known."""
+
+    name = "file"
+
+    def __init__(self, *endings: str) -> None:
+        """Args: endings: those that the name may have."""
+        self.endings = endings
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name.
+
+        Raises:
+            InputError: it has another ending.
+        """
+        name = str(value)
+        if not name.endswith(self.endings):
+            raise InputError(f"{name}: the name must end in {' or '.join(self.endings)}")
+        return name
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Return the files that begin so."""
+        return _files(incomplete)
+
+
+def _items(words: Iterable[str], incomplete: str) -> list[CompletionItem]:
+    return [CompletionItem(word) for word in words if word.startswith(incomplete)]
+
+
+def _files(incomplete: str) -> list[CompletionItem]:
+    return [CompletionItem(incomplete, type="file")]
+
+
+def targets(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a target: the poses of --boom, or the beginning of a position."""
+    from boom_model import Boom
+
+    boom = Boom.load(ctx.params.get("boom_file"))
+    return _items((*boom.poses, "tip=", "q="), incomplete)
+
+
+def constraints(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a constraint."""
+    from boom_model.kinematics.constraints import WORDS
+
+    return _items((*WORDS, "actuator=", "extension=", "nearest="), incomplete)
+
+
+def joints(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a joint."""
+    from boom_model import JOINTS
+
+    return _items(JOINTS, incomplete)
+
+
+def missions(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a mission, or of a file of one."""
+    from planner.missions.mission import named_missions
+
+    return _items(named_missions(), incomplete) or _files(incomplete)
+
+
+def vehicles(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a vehicle case, or of a file of one."""
+    from planner.motion.vehicle import named_cases
+
+    return _items(named_cases(), incomplete) or _files(incomplete)

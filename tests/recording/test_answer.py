@@ -1,0 +1,93 @@
+"""The first tab of a recording: the answer is the JSON's, the lanes are the motion's."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from boom_model import Boom
+from planner import TimeOptimal, plan
+from planner.recording import write_recording
+from planner.recording.states import AT_LIMIT, active_limits, lanes, phases
+from planner.reports.answer import joint_table
+from tests.recordings import recorded_rows
+
+BOOM = Boom.load()
+
+
+def static(path, entity, component):
+    ((value,),) = recorded_rows(path, entity, component, static=True)
+    return value
+
+
+def move(profile):
+    return plan(BOOM, "transport", "phenotyping", profile=profile)
+
+
+def test_the_numbers_of_the_first_tab_are_those_of_the_json(boom):
+    code, out, _ = boom("plan", "transport", "phenotyping", "--out", "move.rrd", "--json")
+    assert code == 0
+    answer = json.loads(out)
+    text = static("move.rrd", "/answer", "TextDocument:text")
+    assert text.startswith(f"# {answer['verdict']}\n")
+    assert f"{answer['duration_s']:.3f} s" in text
+    rows = {(row["joint"], row["check"]): row for row in answer["checks"]}
+    table = re.findall(r"^\| (\w+) \| ([\d.]+) (?:Nm|N|mm) \| ([\w ]+|-) \| ([\d.]+|-) \|", text, flags=re.MULTILINE)
+    assert [joint for joint, *_ in table] == ["yaw", "inner", "lower", "extension", "wrist", "mount", "tip"]
+    for joint, _, check, used in table:
+        if check != "-":
+            row = rows[joint, check]
+            share = row["demand"] * (1.0 + row["required_margin"]) / row["limit"]
+            assert float(used) == pytest.approx(share, abs=0.005)
+
+
+def test_the_recording_tells_what_was_asked(boom):
+    boom("plan", "transport", "phenotyping", "--payload", "8", "-q")
+    told = {name: static("move.rrd", "/__properties/boom", name) for name in ("payload_kg", "verdict", "command", "versions")}
+    assert (told["payload_kg"], told["verdict"]) == (8.0, "INCOMPLETE")
+    assert told["command"] == "boom plan transport phenotyping --payload 8 -q"
+    assert "rerun-sdk 0." in told["versions"]
+
+
+def test_a_time_optimal_move_is_at_a_limit_nearly_always():
+    fast = move(TimeOptimal())
+    met = np.array([limit != "none" for limit in active_limits(fast)])
+    assert met.mean() > 0.95
+    slow = plan(BOOM, "transport", "phenotyping", duration=20.0)
+    assert set(active_limits(slow)) == {"none"}
+
+
+@pytest.mark.parametrize("profile", ["cubic", "trapezoidal", "jerk-limited"])
+def test_phases_are_those_of_the_speed(profile):
+    found = move(profile)
+    named = phases(found)
+    order = list(dict.fromkeys(named))
+    steady = [] if profile == "cubic" else ["steady"]
+    assert [each for each in order if each != "at rest"] == ["accelerating", *steady, "braking"]
+    speed = (np.abs(found.trajectory.qd) / BOOM.limits.velocity).max(axis=-1)
+    for k in range(len(speed) - 1):
+        if named[k] in ("accelerating", "braking"):
+            assert (speed[k + 1] > speed[k]) == (named[k] == "accelerating")
+
+
+def test_a_limit_that_is_named_is_met():
+    found = move("jerk-limited")
+    for k, named in enumerate(active_limits(found)):
+        if named.endswith("velocity"):
+            i = ["yaw", "inner", "lower", "extension", "wrist"].index(named.split()[0])
+            assert abs(found.trajectory.qd[k, i]) >= AT_LIMIT * BOOM.limits.velocity[i] - 1e-12
+
+
+def test_brakes_are_engaged_at_rest():
+    (brakes,) = (lane for lane in lanes(move("cubic")) if lane.entity == "states/brakes")
+    assert brakes.states[0] == brakes.states[-1] == "engaged"
+    assert set(brakes.states[1:-1]) == {"released"}
+
+
+def test_the_table_is_the_answers(tmp_path):
+    found = move("cubic")
+    write_recording(tmp_path / "move.rrd", found)
+    text = static(tmp_path / "move.rrd", "/answer", "TextDocument:text")
+    for row in joint_table(found.report):
+        assert f"| {' | '.join(row)} |" in text
