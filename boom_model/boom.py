@@ -48,10 +48,10 @@ LOAD_UNITS = tuple("N" if length else "Nm" for length in IS_LENGTH)
 """Unit of each joint's torque; the extension's is a force."""
 
 MOVING_BODIES = ("lower", "inner", "outer", "upper", "extension", "end_effector")
-"""Bodies that move against the yawing base; the payload moves with the end effector."""
+"""Bodies that move relative to the yawing base. The payload moves with the end effector."""
 
 LIMIT_TOLERANCE = 1e-9
-"""Slack [rad or m] of every comparison with a position limit: rounding is not a violation."""
+"""Tolerance [rad or m] of every comparison with a position limit, for rounding."""
 
 
 _LENGTHS = {"L1": OFFSET, "L2": OFFSET, "L3": LENGTH, "L4": LENGTH, "L6": OFFSET, "L7": LENGTH, "L8": WIDTH}
@@ -59,7 +59,7 @@ _LENGTHS = {"L1": OFFSET, "L2": OFFSET, "L3": LENGTH, "L4": LENGTH, "L6": OFFSET
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Lengths [m] of the thesis's figure 2-1. L5 = L3 and L9 = L4: the linkage is a parallelogram."""
+    """Lengths [m] (thesis, figure 2-1). L5 = L3 and L9 = L4, as the linkage is a parallelogram."""
 
     L1: float
     L2: float
@@ -75,10 +75,12 @@ class Geometry:
 
     @property
     def L5(self) -> float:
+        """Side of the parallelogram on the upper link, equal to L3 [m]."""
         return self.L3
 
     @property
     def L9(self) -> float:
+        """Side of the parallelogram on the inner link, equal to L4 [m]."""
         return self.L4
 
 
@@ -119,9 +121,10 @@ class Limits:
     linkage: float
     """Coupled limit: theta3 - theta2 may not fall below this [rad]."""
     transmission: float
-    """Transmission angle [rad] below which the flattening parallelogram's pin forces deserve a warning."""
+    """Transmission angle [rad] below which pin forces become large, with a warning."""
     origins: Mapping[str, tuple[Origin, ...]]
-    """Origin of every figure: keys position, velocity, acceleration and jerk (5 each), linkage and transmission (1)."""
+    """Origin of every value, with the keys position, velocity, acceleration and jerk (5 each), linkage
+    and transmission (1)."""
 
     def __post_init__(self) -> None:
         for name, (angular, linear) in _LIMITS.items():
@@ -132,20 +135,21 @@ class Limits:
         TRANSMISSION_ANGLE.require_radians("transmission", scalar("transmission", self.transmission))
 
     def excess(self, q: ArrayLike) -> Array:
-        """How far q is outside each position limit, shape (..., 6); negative inside.
+        """Return the excess of q (..., 5) over each position limit, (..., 6) [rad, m].
 
-        The last entry is the coupled limit, theta2 + linkage - theta3. Entries in rad, the extension's in m.
+        It is negative inside the limit. The last entry is for the coupled limit: theta2 + linkage -
+        theta3.
         """
         q = np.asarray(q, dtype=float)
         coupled = q[..., 1:2] + self.linkage - q[..., 2:3]
         return np.concatenate([np.maximum(self.lower - q, q - self.upper), coupled], axis=-1)
 
     def contain(self, q: ArrayLike) -> Mask:
-        """Whether q (..., 5) is within every position limit, to LIMIT_TOLERANCE; bool of shape (...)."""
+        """Return whether q (..., 5) is within every position limit, to LIMIT_TOLERANCE, (...)."""
         return np.asarray((self.excess(q) <= LIMIT_TOLERANCE).all(axis=-1))
 
     def reasons(self, q: ArrayLike) -> list[str]:
-        """One sentence for each position limit that q (5,) breaks: which, by how much, and the bound."""
+        """Return a sentence per position limit that q (5,) exceeds, with excess and bound."""
         q = checked("q", q, 5)
         sentences = []
         for i in map(int, np.flatnonzero(self.excess(q)[:5] > LIMIT_TOLERANCE)):
@@ -166,21 +170,21 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Friction:
-    """Joint friction, viscous qd + coulomb sign(qd); arrays (5,), 0 where none is given."""
+    """Joint friction, viscous qd + coulomb sign(qd). Arrays (5,); 0 if not given."""
 
     viscous: Array
-    """[Nm s/rad, the extension's N s/m]"""
+    """[Nm s/rad, N s/m for the extension]"""
     coulomb: Array
-    """[Nm, the extension's N]"""
+    """[Nm, N for the extension]"""
     origins: tuple[Origin | None, ...]
-    """Of each joint's pair; None where none is given."""
+    """Origin of the two values of each joint; None if not given."""
 
     def __post_init__(self) -> None:
         VISCOUS_FRICTION.require("viscous friction", _of_shape("viscous friction", self.viscous, (5,)))
         COULOMB_FRICTION.require("coulomb friction", _of_shape("coulomb friction", self.coulomb, (5,)))
 
     def torque(self, qd: ArrayLike) -> Array:
-        """Return the torque [Nm, the extension's N] that overcomes friction at joint velocities qd (..., 5), same shape."""
+        """Return the torque (..., 5) against friction at joint velocities qd (..., 5) [Nm, N]."""
         qd = np.asarray(qd, dtype=float)
         torque: Array = self.viscous * qd + self.coulomb * np.sign(qd)
         return torque
@@ -188,7 +192,7 @@ class Friction:
 
 @dataclass(frozen=True)
 class Mount:
-    """What the vehicle's mount bears; None where nobody says."""
+    """Largest loads of the mount on the vehicle; None if unknown."""
 
     force: Sourced[float] | None
     """Largest force [N]."""
@@ -208,12 +212,12 @@ class Boom:
     name: str
     geometry: Geometry
     bodies: Mapping[str, Body]
-    """base, and each of MOVING_BODIES."""
+    """The base and each of MOVING_BODIES."""
     payload: Body
-    """In frame 11, the tip."""
+    """Payload, in frame 11 at the tip."""
     limits: Limits
     drives: tuple[Drive | None, ...]
-    """One a joint; None where no drive is given, and then nothing about it can be checked."""
+    """Drive of each joint; None if not given, and then it cannot be checked."""
     poses: Mapping[str, Array]
     """Named joint positions, each (5,)."""
     friction: Friction
@@ -221,9 +225,9 @@ class Boom:
     gravity: float = 9.81
     """[m/s^2]"""
     actuator: LinearDrive | None = None
-    """Linear actuator of the extension; None where none is given, as for drives."""
+    """Linear actuator of the extension; None if not given."""
     keep_out: KeepOut | None = None
-    """What the arm must keep away from; None where nobody says."""
+    """Shapes to avoid; None if not given."""
 
     def __post_init__(self) -> None:
         GRAVITY.require("gravity", scalar("gravity", self.gravity))
@@ -234,24 +238,29 @@ class Boom:
 
     @staticmethod
     def load(path: str | Path | None = None, catalogue: str | Path | None = None) -> "Boom":
-        """The third-generation boom (thesis, Appendix C and table 2-3), or one described by a TOML file of the same form.
+        """Read a boom from a TOML file.
+
+        The shipped file describes the third-generation boom (thesis, Appendix C and table 2-3).
 
         Args:
-            path: a boom's TOML file; None is the shipped `boom_model/data/third_generation.toml`.
-            catalogue: a TOML file of drives of the user's own, beside the shipped ones.
+            path: the file; None is the shipped `boom_model/data/third_generation.toml`.
+            catalogue: a TOML file with more drives, besides the shipped ones.
 
         Raises:
-            InputError: the file cannot be read, is malformed, or names unknown keys or drives; the key is named.
+            InputError: the file cannot be read, is malformed, or has unknown keys or drives; the
+                message names the key.
         """
         from boom_model.boom_file import read_boom
 
         return read_boom(path, catalogue)
 
     def with_payload(self, mass: float) -> "Boom":
-        """The same boom with a payload of another mass [kg]: same centre of mass, inertia in proportion.
+        """Return the boom with another payload mass [kg].
+
+        The centre of mass stays, and the inertia changes in proportion.
 
         Raises:
-            InputError: not finite, negative or beyond what is plausible.
+            InputError: the mass is not finite, negative or not plausible.
         """
         mass = scalar("payload", mass)
         MASS.require("payload", mass)
@@ -260,10 +269,13 @@ class Boom:
         return replace(self, payload=Body(mass, old.com, read_only(inertia)))
 
     def with_body_mass(self, name: str, mass: float) -> "Boom":
-        """The same boom with a body of another mass [kg]: same centre of mass, inertia in proportion.
+        """Return the boom with another mass [kg] of a body.
+
+        The centre of mass stays, and the inertia changes in proportion.
 
         Raises:
-            InputError: no such body, a mass that is not finite or not plausible, or a body without mass to scale.
+            InputError: the body is unknown or has no mass to scale, or the mass is not finite or
+                not plausible.
         """
         if name not in self.bodies:
             raise unknown("body", name, self.bodies)
@@ -276,13 +288,15 @@ class Boom:
         return replace(self, bodies=MappingProxyType({**self.bodies, name: changed}))
 
     def with_drive(self, joint: str, drive: Drive | LinearDrive | None) -> "Boom":
-        """The same boom with another drive on a joint; the mass of the bodies stays as it is.
+        """Return the boom with another drive on a joint. The masses of the bodies stay unchanged.
 
         Args:
-            drive: a linear drive replaces the boom's actuator; None leaves the joint without a drive.
+            joint: name of the joint.
+            drive: the drive; a linear drive replaces the actuator of the boom. None leaves the
+                joint without a drive.
 
         Raises:
-            InputError: no such joint, or a linear drive on a joint that turns.
+            InputError: the joint is unknown, or a linear drive is given for a rotary joint.
         """
         if joint not in JOINTS:
             raise unknown("joint", joint, JOINTS)
@@ -293,10 +307,10 @@ class Boom:
         return replace(self, drives=tuple(drive if name == joint else d for name, d in zip(JOINTS, self.drives, strict=True)))
 
     def pose(self, name: str) -> Array:
-        """The named pose, (5,).
+        """Return a named pose, (5,).
 
         Raises:
-            InputError: no such pose; lists those there are.
+            InputError: the pose is unknown; the message lists the known ones.
         """
         try:
             return self.poses[name]

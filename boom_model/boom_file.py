@@ -58,7 +58,11 @@ _Coulomb = Annotated[float, COULOMB_FRICTION]
 
 
 def inertia_tensor(value: Any) -> Array:
-    """The tensor of [Ixx, Iyy, Izz] or of a 3 x 3 matrix, as a body can have it."""
+    """Return the inertia tensor (3, 3) for [Ixx, Iyy, Izz] or for a 3 x 3 matrix.
+
+    Raises:
+        ValueError: no body can have this tensor.
+    """
     try:
         given = checked("inertia", value)
     except InputError:
@@ -78,7 +82,7 @@ def inertia_tensor(value: Any) -> Array:
 
 
 def _entries(value: Any) -> Iterator[Any]:
-    """What stands in a list of numbers or of such lists."""
+    """Iterate over the entries of a list of numbers or of such lists."""
     for part in value if isinstance(value, list) else [value]:
         yield from part if isinstance(part, list) else [part]
 

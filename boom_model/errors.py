@@ -1,13 +1,13 @@
-"""What the toolkit says when it cannot do what was asked."""
+"""Exceptions of the toolkit."""
 
 
 class BoomError(Exception):
-    """Base of the errors below; its message is one readable sentence."""
+    """Base class of the errors below. The message is one readable sentence."""
 
 
 class InputError(BoomError, ValueError):
-    """The input itself is wrong: not finite, of the wrong shape, malformed, unknown, not readable or not writable."""
+    """The input is wrong: not finite, of wrong shape, malformed, unknown, or a file fails."""
 
 
 class InfeasibleError(BoomError):
-    """The input is sound and the answer is no: out of reach, outside a limit, too fast, too heavy."""
+    """The input is valid, but the answer is no: out of reach, outside a limit, or too heavy."""

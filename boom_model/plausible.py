@@ -1,7 +1,8 @@
-"""Plausible ranges by quantity: wide enough for any boom of 10 cm to 30 m, and what lies beyond is a slip.
+"""Plausible ranges of quantities. A value outside is most likely a mistake.
 
-The one table that TOML files, options of the command and booms made in code are held to. Angles are in degrees, as people give
-them. A rate may be so large that it is no limit.
+The ranges are wide enough for any boom of 10 cm to 30 m. TOML files, options of the command and
+booms made in Python are all checked against this table. Angles are in degrees. Rates may be so
+large that they are no limit.
 """
 
 from collections.abc import Iterator
@@ -15,27 +16,27 @@ from pydantic.types import AllowInfNan
 
 from boom_model.errors import InputError
 
-_ROUNDING = 1e-9  # relative, of a change of unit
+_ROUNDING = 1e-9  # relative; rounding of a change of unit
 _NOTHING = 1e-12
 
 
 @dataclass(frozen=True)
 class Range(GroupedMetadata):
-    """The bounds of a quantity; in a schema, `Annotated[float, LENGTH]` holds a key to them."""
+    """Bounds of a quantity. In a schema, `Annotated[float, LENGTH]` checks a key against them."""
 
     low: float
     high: float
     unit: str
 
     def __iter__(self) -> Iterator[object]:
-        """What pydantic holds a number to; one below 1e-12 is what rounding has left of a zero."""
+        """Return the constraints for pydantic. A number below 1e-12 becomes 0."""
         return iter((AllowInfNan(False), Ge(self.low), Le(self.high), AfterValidator(_without_rounding)))
 
     def require(self, name: str, values: ArrayLike) -> None:
-        """Whether every value is within the bounds.
+        """Check that every value is within the bounds.
 
         Raises:
-            InputError: one is not, or is NaN; names it, its value and the bounds.
+            InputError: a value is outside or NaN; the message has name, value and bounds.
         """
         array = np.asarray(values, dtype=float)
         outside = ~((array >= self.low - abs(self.low) * _ROUNDING) & (array <= self.high + abs(self.high) * _ROUNDING))
@@ -44,7 +45,7 @@ class Range(GroupedMetadata):
             raise InputError(f"{name} is {value:g}{unit}; it must be between {self.low:g} and {self.high:g}{unit}")
 
     def require_radians(self, name: str, values: ArrayLike) -> None:
-        """The same for angles in radians, where the bounds are in degrees.
+        """Check angles in radians against bounds in degrees.
 
         Raises:
             InputError: as `require`.

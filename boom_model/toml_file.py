@@ -24,10 +24,11 @@ _LONGEST = 40  # digits or letters of a value that a message shows
 
 
 def read_toml(path: Path, schema: type[Schema]) -> Schema:
-    """The file as an instance of `schema`.
+    """Read a TOML file into an instance of `schema`.
 
     Raises:
-        InputError: the file cannot be read, is not TOML, or breaks the schema; every offending key is named.
+        InputError: the file cannot be read, is not TOML, or does not match the schema; the message
+            names every wrong key.
     """
     try:
         data = tomllib.loads(path.read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Numbers, joint positions and names as people write them."""
+"""Parsing of numbers, joint positions and names."""
 
 from collections.abc import Iterable
 
@@ -9,14 +9,14 @@ from boom_model.errors import InputError
 from boom_model.plausible import NUMBER
 
 _LIKE = 0.65  # of 1; at 0.6 "elbow" would be like "lower"
-_NOTHING = 1e-12  # degrees or metres: a distance as small would ask for an infinite speed along the path
+_NOTHING = 1e-12  # degrees or metres; so small a distance would need an infinite speed along the path
 
 
 def joint_position(text: str, rest: str) -> Array:
-    """Return a joint position (5,) in SI from five numbers with commas: degrees, the extension in metres.
+    """Return a joint position (5,) in SI from five comma-separated numbers [deg, m].
 
     Args:
-        text: what a message quotes.
+        text: text that a message quotes.
         rest: the numbers.
 
     Raises:
@@ -28,10 +28,10 @@ def joint_position(text: str, rest: str) -> Array:
 
 
 def numbers(text: str, rest: str, count: int) -> list[float]:
-    """Return the `count` finite numbers with commas of `rest`.
+    """Return the `count` finite comma-separated numbers of `rest`.
 
     Raises:
-        InputError: they are malformed, not finite, or too many or too few; quotes `text`.
+        InputError: they are malformed, not finite, too many or too few; the message quotes `text`.
     """
     parts = rest.split(",")
     if len(parts) != count:

@@ -1,4 +1,4 @@
-"""Thirty kilograms on a boom made for ten: what fails, where, and what would mend it.
+"""Thirty kilograms on a boom made for ten: what fails, where, and possible fixes.
 
     python3 demos/07_an_infeasible_plan_explained.py
 
@@ -22,7 +22,7 @@ def main() -> None:
         except InfeasibleError as error:
             print(error)
         for suggestion in suggestions(boom, move):
-            print(f"  would mend it: {suggestion.sentence}")
+            print(f"  possible fix: {suggestion.sentence}")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ def main(out: str = "drives.png") -> None:
         margin = "-" if tightest is None or tightest.margin is None else f"{tightest.margin:.0%}"
         found = f"{best.name} does not fail, {margin} of torque to spare, and saves {choice.saves:.1f} kg"
         print(f"{choice.variant}, {choice.joint}: {found}")
-        print(f"  not known: {', '.join(best.unknown)}; warned of: {', '.join(best.warned) or 'nothing'}")
+        print(f"  without data: {', '.join(best.unknown)}; warnings: {', '.join(best.warned) or 'nothing'}")
         for failed in (judged for judged in choice.judged if judged.fails and judged.mass and judged.mass < (best.mass or 0.0)):
             row = failed.first_failing
             print(f"  lighter, but fails: {failed.name}, {failed.supply}: {'no motion' if row is None else row.check}")

@@ -1,6 +1,6 @@
-"""The process of the command `boom`, or `python -m planner`: what holds from its first moment to its last.
+"""The process of the command `boom`, or of `python -m planner`.
 
-It imports nothing that takes time before the signals have their handler.
+It sets its signal handlers before it imports anything slow.
 """
 
 import os
@@ -11,9 +11,9 @@ _STOPPED = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
 def _stop(number: int, _: object) -> None:
-    """Ends the process at once.
+    """End the process at once.
 
-    An exception would have to pass through libraries that swallow it, or turn it into an error of theirs.
+    An exception would not do, because libraries may catch it or replace it by their own.
     """
     discard = getattr(sys.modules.get("planner.files"), "discard", None)
     if discard is not None:
@@ -25,24 +25,28 @@ def _stop(number: int, _: object) -> None:
 
 
 def main() -> None:
-    """Run the command; exit 130 or 143 with one line when it is interrupted or terminated, else as `planner.cli.main`."""
+    """Run the command and exit as `planner.cli.main`.
+
+    If the process is interrupted or terminated, the exit code is 130 or 143, with one line on
+    standard error.
+    """
     for number in _STOPPED:
         signal.signal(number, _stop)
     import warnings
 
-    # The boom's matrices are small: threads of linear algebra only wait for each other.
+    # The matrices are small: threads of linear algebra would only wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever the user's windows are drawn with
+    os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever backend the user has set
     if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a file's name may hold any byte
-    # NumPy only warns of numbers beyond what it can compute, and goes on with an infinity.
+        sys.stdout.reconfigure(errors="backslashreplace")  # a file name may have any byte
+    # By default NumPy only warns of an overflow, and continues with an infinity.
     warnings.filterwarnings("error", "(overflow|invalid value|divide by zero) encountered", RuntimeWarning)
     from planner.cli import main as run
 
     try:
         run()
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # nothing is left to interrupt
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 

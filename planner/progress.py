@@ -1,7 +1,7 @@
-"""Iteration that may show how far it is."""
+"""Type of an iteration that can show progress."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
 Track = Callable[[list[Any]], Iterable[Any]]
-"""Goes through the steps of a job, as `iter` does, and may show on the way how far it is."""
+"""Iterates over the steps of a job, as `iter` does, and may show progress."""

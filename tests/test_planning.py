@@ -210,7 +210,7 @@ def test_a_controllers_rate_rounds_a_given_duration_up():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"profile": "septic"}, "profile is 'septic'"),
+        ({"profile": "septic"}, "unknown profile 'septic'"),
         ({"duration": 0.0}, "duration is 0 s"),
         ({"duration": np.nan}, "duration is nan"),
         ({"step": -1.0}, "step is -1"),

@@ -9,18 +9,18 @@ from boom_model.drives.drive import drive_inertia, motor_limit
 
 
 def rotors(boom: Boom) -> Array:
-    """(5,) what the drives' own inertia adds to the motors' share, eta N^2 (J_rotor + J_gear) [kg m^2]."""
+    """Return the drive inertia eta N^2 (J_rotor + J_gear) at the joints, (5,) [kg m^2]."""
     return np.array([drive_inertia(drive) if drive else 0.0 for drive in boom.drives])
 
 
 def gear_limits(boom: Boom) -> Array:
-    """(5,) start-stop torque of the gearboxes [Nm]; infinite where none is given."""
+    """Return the start-stop torque of the gearboxes, (5,) [Nm]; infinite if unknown."""
     limits = [None if drive is None else drive.gearbox.start_stop_torque for drive in boom.drives]
     return np.array([np.inf if limit is None else limit for limit in limits])
 
 
 def motor_limits(boom: Boom, speed: ArrayLike) -> Array:
-    """`motor_limit` of every joint at joint speeds (..., 5), likewise shaped; infinite where no motor limits."""
+    """Return `motor_limit` of each joint at joint speeds (..., 5); infinite if there is none."""
     speed = np.asarray(speed, dtype=float)
     limits = np.full_like(speed, np.inf)
     for i, drive in enumerate(boom.drives):
@@ -31,5 +31,5 @@ def motor_limits(boom: Boom, speed: ArrayLike) -> Array:
 
 
 def static_limits(boom: Boom) -> Array:
-    """(5,) torque that motor and gearbox allow at rest [Nm]; infinite where no drive limits."""
+    """Return the torque that motor and gearbox allow at rest, (5,) [Nm]; infinite if unlimited."""
     return np.minimum(gear_limits(boom), motor_limits(boom, np.zeros(5)))

@@ -1,16 +1,19 @@
-"""Mass matrix and bias torque in closed form: constants of the boom times products of sines, cosines and rates.
+"""Mass matrix and bias torque in closed form.
 
-With the vectors b, the constant Q and the plane of `newton_euler`, d'Alembert's principle gives the torque of joint i as
+The vectors b, the constant matrix Q and the plane of the arm are those of `newton_euler`. The
+torque of joint i follows from d'Alembert's principle:
 
     tau_i = sum_ab db_a/dq_i . Q_ab A_b            A_b: acceleration of b_b less gravity
 
-The vectors b and their derivatives are linear in nine features of the position,
+The vectors b and their derivatives are linear in nine features of the position:
 
-    f = (1, c2, c3, ct, s2, s3, st, rho c3, rho s3)            c, s: cosine and sine; 2, 3, t and rho: as in b
+    f = (1, c2, c3, ct, s2, s3, st, rho c3, rho s3)       c, s: cosine and sine; 2, 3, t, rho as in b
 
-and A is linear in what accelerates the boom: the joints' accelerations, the base's, and products of two rates. Each
-coefficient of tau is therefore a constant quadratic form in f. A batch takes some twenty calls of NumPy, where
-Newton-Euler takes hundreds: this is for many small batches one after the other, as integrators ask for.
+A is linear in the accelerations of joints and base, and in products of two rates. Therefore each
+coefficient of tau is a constant quadratic form in f.
+
+A batch takes about twenty calls of NumPy, and hundreds with Newton-Euler. This is faster for many
+small batches one after the other, as in an integrator.
 """
 
 from collections.abc import Callable, Sequence
@@ -39,31 +42,35 @@ _FIRST_PAIR = 10
 
 
 class Forms(NamedTuple):
-    """Constant quadratic forms in f, (45, 5 k): k coefficients of the torque of each joint; payload as mass."""
+    """Constant quadratic forms in f (45, 5 k) for k coefficients of each joint torque; payload as mass."""
 
     inertia: Array
     """k = 5: joint accelerations, the mass matrix."""
     level: Array
-    """k = 21: joint accelerations; gravity; products of two joint rates. For a base at rest on level ground."""
+    """k = 21: joint accelerations; gravity; products of two joint rates, for a base at rest."""
     moving: Array
-    """k = 38: joint accelerations; the base's acceleration less gravity along x, z and n; the plane's angular
-    acceleration about x and n; products of two of the seven rates."""
+    """k = 38: joint accelerations; acceleration of the base less gravity along x, z and n; angular
+    acceleration of the plane about x and n; products of two of the seven rates."""
     tip: Array
     """(9, 15), linear in f: 3 coefficients a joint, of a force at the tip along x, z and n."""
 
 
 def mass_forms(boom: Boom, q: Array) -> Array:
-    """M (n, 5, 5) at joint positions q (n, 5)."""
+    """Return M (n, 5, 5) at joint positions q (n, 5)."""
     return _evaluate(_forms(boom).inertia, _features(boom, q))
 
 
 def mass_and_bias(
     boom: Boom, q: Array, qd: Array, base: Sequence[Array] | None, tip_force: Array | None
 ) -> tuple[Array, Array]:
-    """M (n, 5, 5) and the torque at rest accelerations (n, 5), at states q, qd (n, 5).
+    """Return M (n, 5, 5) and the torque (n, 5) without joint acceleration.
 
     Args:
-        base: angular velocity, angular acceleration, acceleration and up (n, 3) along frame 1; None is at rest and level.
+        boom: the boom.
+        q: joint positions (n, 5).
+        qd: joint velocities (n, 5).
+        base: angular velocity, angular acceleration, acceleration and up, each (n, 3) along frame
+            1; None is at rest on level ground.
         tip_force: (n, 3) along frame 1.
     """
     forms, f, count = _forms(boom), _features(boom, q), len(q)
@@ -100,10 +107,10 @@ def _features(boom: Boom, q: Array) -> Array:
 
 
 def _evaluate(forms: Array, f: Array) -> Array:
-    """Quadratic forms at features (n, 9): (n, 5, k)."""
+    """Return the quadratic forms at features (n, 9) as (n, 5, k)."""
     count, coefficients = len(f), forms.shape[1] // 5
     products = f.take(_PRODUCTS[0], axis=1) * f.take(_PRODUCTS[1], axis=1)
-    if count == 1:  # BLAS rounds a vector's product otherwise than a matrix's: a state's result must not depend on its batch
+    if count == 1:  # BLAS rounds a vector's product differently; a state must not depend on its batch
         return (np.concatenate([products, products]) @ forms)[:1].reshape(1, 5, coefficients)
     return (products @ forms).reshape(count, 5, coefficients)
 
@@ -114,7 +121,7 @@ def _times(G: Array, causes: Array) -> Array:
 
 
 def _into_plane(q: Array, vectors: Array) -> Array:
-    """Vectors (n, 3) along frame 1 to the plane's x, z and n."""
+    """Return vectors (n, 3), given along frame 1, along x, z and n of the plane."""
     c, s = np.cos(q[:, 0]), np.sin(q[:, 0])
     x, y = vectors[:, 0], vectors[:, 1]
     return np.column_stack([c * x + s * y, vectors[:, 2], s * x - c * y])
@@ -142,7 +149,7 @@ def _forms(boom: Boom) -> Forms:
 
 
 def _vectors() -> Array:
-    """The vectors b along x, z and n as constants times f: (9, 3, 11)."""
+    """Return the vectors b along x, z and n as constants (9, 3, 11) times f."""
     b = np.zeros((9, 3, 11))
     b[0, [0, 1, 2], [1, 2, 3]] = 1.0  # x, z, n
     for e, c, s in ((4, 1, 4), (6, 2, 5), (9, 3, 6)):  # e = (c, s, 0), p = (-s, c, 0)
@@ -153,7 +160,7 @@ def _vectors() -> Array:
 
 
 def _by_joint(joint: int) -> Callable[[Array], Array]:
-    """The derivative by theta2, theta3, theta4 or theta5 (joint 1 to 4) of what is linear in f, (9, 3, 11)."""
+    """Return the derivative of (9, 3, 11) constants times f by theta2 to theta5 (joint 1 to 4)."""
     D = np.zeros((9, 9))  # of f_p by q: sum_r D_pr f_r
     for cosine, sine in {1: [(1, 4)], 2: [(2, 5), (3, 6), (7, 8)], 3: [], 4: [(3, 6)]}[joint]:
         D[cosine, sine], D[sine, cosine] = -1.0, 1.0
@@ -163,5 +170,5 @@ def _by_joint(joint: int) -> Callable[[Array], Array]:
 
 
 def _by_turn(axis: int) -> Callable[[Array], Array]:
-    """The derivative of vectors (9, 3, 11) by a turn of the plane about x, z or n: axis x b."""
+    """Return the derivative of vectors (9, 3, 11) by a turn of the plane about x, z or n: axis x b."""
     return lambda x: np.cross(np.eye(3)[axis], x, axisb=1, axisc=1)

@@ -44,11 +44,15 @@ def mass_matrix_and_bias(
 ) -> tuple[Array, Array]:
     """Return M(q) (..., 5, 5) and the torque C(q, qd) qd + g(q) (..., 5) at zero joint acceleration.
 
-    The same as `mass_matrix` and `inverse_dynamics` with qdd = 0, at a fraction of the time on small batches.
+    They equal `mass_matrix` and `inverse_dynamics` with qdd = 0. On small batches this function takes
+    a fraction of their time.
 
     Args:
-        q, qd: (..., 5); they broadcast.
-        base, tip_force: as in `inverse_dynamics`.
+        boom: the boom.
+        q: joint positions (..., 5).
+        qd: joint velocities (..., 5); q and qd broadcast.
+        base: motion of the base, as in `inverse_dynamics`.
+        tip_force: force on the tip, as in `inverse_dynamics`.
 
     Raises:
         InputError: an input is not finite or of the wrong shape, or shapes do not match.

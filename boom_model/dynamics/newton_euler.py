@@ -84,14 +84,20 @@ def inverse_dynamics(
     drive_inertia: bool = False,
     reactions: bool = True,
 ) -> Loads:
-    """Joint torques, pin forces and mount wrench for a motion, by Newton-Euler (thesis, eqs. 2.45-2.71 as corrected).
+    """Compute joint torques, pin forces and mount wrench of a motion.
+
+    Newton-Euler method (thesis, eqs. 2.45-2.71 as corrected). q, qd and qdd broadcast.
 
     Args:
-        q, qd, qdd: (..., 5) joint positions, velocities, accelerations [rad, the extension in m]; they broadcast.
+        boom: the boom.
+        q: (..., 5) joint positions [rad, m for the extension].
+        qd: (..., 5) joint velocities [rad/s, m/s].
+        qdd: (..., 5) joint accelerations [rad/s^2, m/s^2].
         base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level ground.
         payload_as: "mass" moves the payload with the tip; "force" hangs its weight there and leaves its inertia out, as the
             thesis does.
-        tip_force, tip_moment: (..., 3) force [N] and moment [Nm] that the surroundings put on the tip, along frame 1.
+        tip_force: (..., 3) external force on the tip, along frame 1 [N].
+        tip_moment: (..., 3) external moment on the tip, along frame 1 [Nm].
         friction: whether tau overcomes the joints' friction, viscous qd + coulomb sign(qd).
         drive_inertia: whether tau accelerates the drives' reflected inertia N^2 (J_rotor + J_gear) too, where it is known.
             Friction and drive inertia are added to tau alone; their reaction on the pins and the mount is left out.
@@ -178,6 +184,7 @@ class Regrouped(NamedTuple):
 
 @lru_cache(maxsize=16)
 def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
+    """Return the regrouped masses of a boom, with the payload as a mass or as a force."""
     elements = _elements(boom)
     bodies = {**boom.bodies, "payload": boom.payload}
     Q = {name: elements[name].T @ _pseudo_inertia(body, R_LINK_BODY[name]) @ elements[name] for name, body in bodies.items()}
@@ -197,7 +204,7 @@ def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
 
 
 def _elements(boom: Boom) -> dict[str, Array]:
-    """g of each body's frame origin, and what a metre along its link's e, p and n adds: (4, 11) a body."""
+    """Return g of each body's frame origin, and its change per metre along e, p and n, (4, 11)."""
     g, unit = boom.geometry, np.eye(11)
     shoulder = unit[_O] + g.L2 * unit[_X] + g.L1 * unit[_Z]
     pin6 = shoulder + g.L3 * unit[_E3]
@@ -217,7 +224,7 @@ def _elements(boom: Boom) -> dict[str, Array]:
 
 
 def _pseudo_inertia(body: Body, R: Array) -> Array:
-    """int (1, r) (1, r)^T dm over a body, r along its link's axes: (4, 4)."""
+    """Return int (1, r) (1, r)^T dm over a body, r along the axes of its link: (4, 4)."""
     com, inertia = R @ body.com, R @ body.inertia @ R.T
     moments = np.empty((4, 4))
     moments[0, 0] = body.mass
@@ -249,7 +256,7 @@ def _state(motion: list[Array]) -> _State:
 
 
 def _columns(vectors: Array) -> Sequence[_Value]:
-    """The x, y and z of vectors (n, 3)."""
+    """Return x, y and z of vectors (n, 3)."""
     return vectors[0].tolist() if len(vectors) == 1 else list(vectors.T)
 
 
@@ -283,7 +290,11 @@ class _Outputs(NamedTuple):
 
 
 def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Vectors (n, 3), checked, of states of a shape that has n of them."""
+    """Return checked vectors (n, 3) for the n states of a shape.
+
+    Raises:
+        InputError: they are not finite or not (..., 3), or the shape does not match.
+    """
     values = checked(name, values, 3)
     try:
         return np.reshape(np.broadcast_to(values, (*shape, 3)), (-1, 3))
@@ -292,7 +303,7 @@ def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def _into_plane(state: _State, vector: Sequence[_Value]) -> _Vector:
-    """A vector along frame 1 to x, z and n of the plane."""
+    """Return the components of a vector, given along frame 1, along x, z and n of the plane."""
     c, s = _cosine_and_sine(state.q[0])
     return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
 
@@ -312,7 +323,9 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
 
 
 def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> _Rows:
-    """A, the acceleration of each vector b along x, z and n: an array (3, 11, n), or three lists of a single state.
+    """Return A, the acceleration of each vector b, along x, z and n.
+
+    It is an array (3, 11, n), or three lists for a single state.
 
     C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
     """
@@ -351,7 +364,7 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
 def _newton_euler(
     model: Regrouped, state: _State, plane: _Plane, force: _Vector | None, moment: _Vector | None, out: _Outputs
 ) -> None:
-    """Fills the outputs of a chunk, under a force and a moment on the tip."""
+    """Fill the outputs of a chunk, with a force and a moment on the tip."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
     (c2, s2), (c3, s3), (ct, st) = _cosine_and_sine(q[1]), _cosine_and_sine(q[2]), _cosine_and_sine(q[2] + q[4])
@@ -368,13 +381,13 @@ def _newton_euler(
     Ux, Uz, Un = U.tolist() if isinstance(A, list) else U
 
     def about(c: _Value, s: _Value, e: int, p: int) -> _Value:
-        """(b_e x U_e + b_p x U_p) . n"""
+        """Return (b_e x U_e + b_p x U_p) . n."""
         turned: _Value = c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
         return turned
 
     on_tool = about(ct, st, _ET, _PT) - mn
     beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
-    # of the vectors b along x and z, less those of the base itself, for moments that need all of the boom
+    # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
     reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
     tau_1 = Ux[_N] - Un[_X] - reach - mz
     tau_2 = about(c2, s2, _E2, _P2)

@@ -46,9 +46,11 @@ def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane 
     plane its end is free. A strut is pinned at both ends.
 
     Args:
+        beam: the beam.
         H: (n + 1,) heights [m].
         axial_acceleration: (2,) a_x as a polynomial of x, constant first [m/s^2, 1/s^2]. Above 0 it
             compresses the link.
+        plane: the plane of buckling: across the plane of the arm, or in it.
     """
     from scipy.sparse.linalg import eigsh
 

@@ -65,6 +65,7 @@ def solve(problem: Problem, near: Array | None = None) -> Optimum:
     multipliers and the bound are those of the problem without smoothing.
 
     Args:
+        problem: the problem.
         near: (n,) heights near the answer, if known.
 
     Raises:

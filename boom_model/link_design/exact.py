@@ -73,6 +73,9 @@ def least_mass(beam: Beam, cases: LoadCases, limits: Limits, *, own_mass: bool =
     """Find the link of least mass.
 
     Args:
+        beam: the beam.
+        cases: the load cases.
+        limits: the limits on stress, deflection, heights and buckling.
         own_mass: whether the mass of the final beam bends it. False freezes the forces of the
             stress-only beam, as Appendix D does.
         shear: whether shear counts in the deflection. It never does with frozen forces.

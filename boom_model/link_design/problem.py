@@ -59,9 +59,11 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Multipliers of all constraints but the bounds of the heights. The Lagrangian is
+    """Multipliers of all constraints except the bounds of the heights.
 
-    (a + slope) . H + constant + sum_k z_k (sum_i C_ki / H_i^3 + D_ki / H_i - 1)
+    The Lagrangian is
+
+        (a + slope) . H + constant + sum_k z_k (sum_i C_ki / H_i^3 + D_ki / H_i - 1)
     """
 
     deflections: Array

@@ -191,6 +191,8 @@ class Search:
         nothing changes.
 
         Args:
+            H: (n + 1,) heights [m].
+            found: the optimum that the heights come from.
             counts: (k,) the load cases whose stress may have a multiplier.
         """
         m = found.multipliers

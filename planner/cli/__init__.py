@@ -1,4 +1,7 @@
-"""The command `boom`: parsing and printing, nothing else. What is slow to import is imported by the command that needs it."""
+"""The command `boom`: parses arguments and prints results.
+
+Each command imports the modules that are slow to import itself.
+"""
 
 import errno
 import os
@@ -15,13 +18,17 @@ from planner.cli.printing import quieten
 
 
 def main() -> None:
-    """Run the command; exit 0 done, 1 the answer is no, 2 bad input, 70 an internal error, each but 0 with one line."""
+    """Run the command and exit.
+
+    The exit code is 0 if all is well, 1 if the answer is no, 2 for bad input, 130 if interrupted,
+    and 70 for an internal error. Every code but 0 comes with one line on standard error.
+    """
     try:
         if sys.stdout is None:
             raise InputError("standard output is closed")
         code = cli.main(prog_name="boom", standalone_mode=False)
         sys.stdout.flush()
-    except SystemExit as stop:  # click ends by itself after shell completion, and, with 1, where a pipe has lost its reader
+    except SystemExit as stop:  # by click: after shell completion, and with 1 if the reader of a pipe has gone
         code = failure(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))) if stop.code else 0
     except (Exception, KeyboardInterrupt) as error:
         code = failure(error)
@@ -29,9 +36,9 @@ def main() -> None:
 
 
 _QUESTIONS = """\
-Can the boom make a move, and do its drives stand it?
+Can the boom make a move, and are its drives strong enough?
   boom plan transport phenotyping
-Which motors and gearboxes do for a day in the field?
+Which motors and gearboxes suit a day in the field?
   boom size field-day
 How light may a link be?
   boom link
@@ -40,16 +47,17 @@ How light may a link be?
 
 
 class _Commands(click.Group):
-    """Commands that take no option of a name that they do not know.
+    """Group of commands that refuse unknown options.
 
-    Several commands take negative numbers as arguments, so click passes unknown options on to them as arguments.
+    Several commands accept negative numbers as arguments. Without this class, click would pass
+    their unknown options on as arguments.
     """
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command's name, the command, and its arguments.
+        """Return the name of the command, the command, and its arguments.
 
         Raises:
-            click.NoSuchOption: the command has no such option; the message suggests the nearest.
+            click.NoSuchOption: the option is unknown; the message suggests the nearest one.
         """
         name, command, rest = super().resolve_command(ctx, args)
         if command is not None:
@@ -67,7 +75,7 @@ class _Commands(click.Group):
 @click.version_option(package_name="boom", prog_name="boom")
 @click.pass_context
 def cli(ctx: click.Context) -> None:
-    """Plan, check and watch the moves of the third-generation phenotyping boom.
+    """Plan, check and record moves of the third-generation phenotyping boom.
 
     Angles are in degrees and lengths in metres; files and JSON are in SI.
     """
@@ -97,6 +105,6 @@ for _command in (
     data.new,
 ):
     _command.params.append(
-        click.Option(["-q", "--quiet"], is_flag=True, expose_value=False, callback=quieten, help="Print errors alone.")
+        click.Option(["-q", "--quiet"], is_flag=True, expose_value=False, callback=quieten, help="Print errors only.")
     )
     cli.add_command(_command)

@@ -1,4 +1,4 @@
-"""Words and names that the shell completes, and words that an option may take."""
+"""Types of option values, and shell completion of names."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -16,43 +16,43 @@ else:
 
 
 class OneOf(_Text):
-    """One of some words. For any other word, the error suggests the nearest."""
+    """One of several words. The error for any other word suggests the nearest one."""
 
     name = "word"
 
     def __init__(self, words: Sequence[str]) -> None:
-        """Args: words: the words there are."""
+        """Set the known words."""
         self.words = tuple(words)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the word.
 
         Raises:
-            InputError: there is no such word.
+            InputError: the word is unknown.
         """
         if value in self.words:
             return str(value)
         raise unknown("value" if param is None else str(param.name).replace("_", " "), value, self.words)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Return the words that begin so."""
+        """Return the words with this beginning."""
         return _items(self.words, incomplete)
 
 
 class OutFile(_Text):
-    """Name of a file to write, by the ending of which its form is known."""
+    """Name of an output file with a given ending."""
 
     name = "file"
 
     def __init__(self, *endings: str) -> None:
-        """Args: endings: those that the name may have."""
+        """Set the allowed endings."""
         self.endings = endings
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the name.
 
         Raises:
-            InputError: it has another ending.
+            InputError: the name has another ending.
         """
         name = str(value)
         if not name.endswith(self.endings):
@@ -60,7 +60,7 @@ class OutFile(_Text):
         return name
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Return the files that begin so."""
+        """Return the files with this beginning."""
         return _files(incomplete)
 
 
@@ -95,14 +95,14 @@ def joints(_: click.Context, __: click.Parameter, incomplete: str) -> list[Compl
 
 
 def missions(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Complete the name of a mission, or of a file of one."""
+    """Complete the name of a mission or of a mission file."""
     from planner.missions.mission import named_missions
 
     return _items(named_missions(), incomplete) or _files(incomplete)
 
 
 def vehicles(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Complete the name of a vehicle case, or of a file of one."""
+    """Complete the name of a vehicle case or of a vehicle file."""
     from planner.motion.vehicle import named_cases
 
     return _items(named_cases(), incomplete) or _files(incomplete)

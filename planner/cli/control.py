@@ -1,4 +1,4 @@
-"""A planned move followed in closed loop."""
+"""The command that simulates planned moves in closed loop."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from boom_model import InputError
+from boom_model import Boom, InputError
 from boom_model.plausible import BANDWIDTH, DAMPING, INTEGRAL, PAYLOAD_ERROR, TIP_TOLERANCE
 from boom_model.words import unknown
 from planner.cli.completion import OutFile
@@ -21,12 +21,15 @@ from planner.cli.options import (
     payload_option,
     plausible,
     report_option,
+    with_names,
 )
 from planner.cli.printing import ANSWER_IS_NO, STYLES, complain, print_files, print_json, print_lines, print_rows, tracked
 from planner.move_spec import MoveWords
 
 if TYPE_CHECKING:
-    from planner.control.study import Study
+    from planner.control.design import Controller
+    from planner.control.study import Setup, Study
+    from planner.files import Outputs
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
@@ -40,7 +43,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option(
     "--shaper", "shapers", default="none", show_default=True, metavar="NAME,...|all",
-    help="none, zv, zvd: impulses that cancel the lowest mode, for half a period or a whole one.",
+    help="none, zv, zvd: input shapers for the lowest mode; zv lasts half a period, zvd a whole one.",
 )  # fmt: skip
 @click.option(
     "--bandwidth",
@@ -48,17 +51,17 @@ if TYPE_CHECKING:
     callback=plausible(BANDWIDTH),
     show_default=True,
     metavar="HZ",
-    help="Natural frequency of the loops' poles.",
+    help="Natural frequency of the closed-loop poles.",
 )
 @click.option(
-    "--damping", default=1.0, callback=plausible(DAMPING), show_default=True, help="Damping ratio of the loops' poles."
+    "--damping", default=1.0, callback=plausible(DAMPING), show_default=True, help="Damping ratio of the closed-loop poles."
 )
 @click.option(
     "--integral",
     default=0.3,
     callback=plausible(INTEGRAL),
     show_default=True,
-    help="Integral action's pole, as a share of the bandwidth.",
+    help="Pole of the integral action, relative to the bandwidth.",
 )
 @payload_option
 @click.option(
@@ -66,32 +69,32 @@ if TYPE_CHECKING:
     default=0.0,
     callback=plausible(PAYLOAD_ERROR),
     metavar="KG",
-    help="True payload less the one that the controllers believe in.",
+    help="True payload minus the payload that the controllers assume.",
 )
 @click.option(
     "--gust",
     metavar="FX,FY,FZ,START,DURATION",
-    help="A push on the tip, (1 - cos)/2, in N along frame 1 and s, within the time simulated: the move and 2 s.",
+    help="Force on the tip in N along frame 1, shaped (1 - cos)/2; start and duration in s, within the move and 2 s after it.",
 )
-@click.option("--rigid-joints", is_flag=True, help="Leave out the gearboxes' elasticity, friction and the links' bending.")
+@click.option("--rigid-joints", is_flag=True, help="Leave out gearbox elasticity, friction and bending of the links.")
 @click.option("--rigid-links", is_flag=True, help="Leave out the bending of inner link and extension.")
-@click.option("--backlash", is_flag=True, help="With the gearboxes' backlash.")
-@click.option("--compensate-sag", is_flag=True, help="Send the motors ahead by the twist that the weight gives.")
+@click.option("--backlash", is_flag=True, help="Include gearbox backlash.")
+@click.option("--compensate-sag", is_flag=True, help="Correct the motor setpoints by the gearbox twist under static load.")
 @click.option(
     "--settle-mm",
     default=1.0,
     callback=plausible(TIP_TOLERANCE),
     show_default=True,
     metavar="MM",
-    help="Within which the tip counts as settled.",
+    help="Largest tip error that counts as settled.",
 )
 @click.option(
     "--set", "figures", multiple=True, metavar="NAME=VALUE",
-    help="A figure that is assumed otherwise, as the report names it: rate_Hz, structural_damping, ...; may be given again.",
+    help="Replace an assumed figure of the report, such as rate_Hz or structural_damping; repeatable.",
 )  # fmt: skip
-@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="The recording, for `boom view`.")
-@click.option("--loops", metavar="FILE.png", help="Bode diagrams and poles as a picture.")
-@click.option("--errors", metavar="FILE.png", help="The tip's errors as a picture.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording for `boom view`.")
+@click.option("--loops", metavar="FILE.png", help="Write a picture with Bode diagrams and poles.")
+@click.option("--errors", metavar="FILE.png", help="Write a picture with the tip errors.")
 @report_option
 @boom_option
 @all_option
@@ -121,7 +124,7 @@ def control(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Follow a planned move in closed loop: design, margins, simulation of the full model, and how far off the tip is.
+    """Simulate planned moves in closed loop: controllers, stability margins, tip errors.
 
     START and GOAL are as in `boom plan`. Exit code 1: a loop is unstable, or a stepper loses a step.
 
@@ -132,16 +135,16 @@ def control(
       boom control transport phenotyping --payload-error 2 --gust 0,0,-30,5.2,0.5 --set structural_damping=0.01
     """
     from planner.control.closed_loop import parse_gust
-    from planner.control.design import Controller, Goals
+    from planner.control.design import Goals
     from planner.control.figures import parse_figures
-    from planner.control.plant import Plant
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
     from planner.planning import plan_move
     from planner.timing.profile import Profile
 
-    boom, case = load_boom(boom_file, payload), None if move.vehicle is None else load_vehicle(move.vehicle)
+    boom = load_boom(boom_file, payload)
     setup = Setup(
+        vehicle=None if move.vehicle is None else load_vehicle(move.vehicle),
         goals=Goals.of(bandwidth, damping, integral),
         figures=parse_figures(figures),
         elastic=not rigid_joints,
@@ -149,47 +152,66 @@ def control(
         backlash=backlash,
         compensate_sag=compensate_sag,
         payload_error=payload_error,
-        vehicle=case,
         gust=None if gust is None else parse_gust(gust),
         settled=settle_mm * 1e-3,
     )
-    chosen = [_several("controller", controllers, list(Controller)), _several("shaper", shapers, list(Shaper))]
-    left_out = controllers == "all" and not Plant.of(boom, setup.figures, elastic=setup.elastic, bending=False).elastic
-    if left_out:
-        chosen[0].remove(Controller.STEPPER)
-    for name in (loops, errors):
-        if name is not None and not name.endswith(".png"):
-            raise InputError(f"{name}: a picture is written as .png")
-    if loops is not None and chosen[0] == [Controller.STEPPER]:
-        raise InputError("a stepper runs open loop: there is no Bode diagram of it")
+    chosen, notes = _controllers(boom, controllers, setup)
+    shaping = [Shaper(name) for name in _several("shaper", shapers, list(Shaper))]
+    _check_pictures(loops, errors, chosen)
     files = outputs(out, loops, errors, document=document, inputs=(boom_file, move.vehicle))
     words = _several("profile", profiles, list(Profile))
     moves = [plan_move(boom, replace(move, profile=word).spec()) for word in words]
-    names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
-    found = study(boom, moves, *names, setup, tracked("simulating"))
-    if left_out:
-        found = replace(found, notes=(*found.notes, "stepper: left out, as it is simulated behind elastic gearboxes alone"))
-    written = {}
-    with files:
-        if out is not None:
-            from planner.recording import write_control_recording
-
-            write_control_recording(files.temporary(out), found)
-            written["recording"] = out
-        if loops is not None or errors is not None:
-            from planner.control.picture import error_figure, loop_figure, write_figure
-
-            for kind, name, figure in (("loops", loops, loop_figure), ("errors", errors, error_figure)):
-                if name is not None:
-                    write_figure(files.temporary(name), figure(found))
-                    written[kind] = name
-        if document is not None:
-            from planner.control.picture import study_pictures
-            from planner.reports.document import write_document
-
-            write_document(files.temporary(document), found.to_markdown(), study_pictures(found))
-            written["report"] = document
+    found = study(boom, moves, chosen, shaping, setup, tracked("simulating"))
+    found = replace(found, notes=(*found.notes, *notes))
+    written = with_names({"recording": out, "loops": loops, "errors": errors, "report": document})
+    _write(files, found, written)
     return _print_study(found, written, as_json, whole)
+
+
+def _controllers(boom: Boom, text: str, setup: "Setup") -> tuple[list["Controller"], list[str]]:
+    """Return the controllers to simulate, and notes on those left out.
+
+    With "all", the stepper is left out if no gearbox is elastic.
+    """
+    from planner.control.design import Controller
+    from planner.control.plant import Plant
+
+    chosen = [Controller(name) for name in _several("controller", text, list(Controller))]
+    if text != "all" or Plant.of(boom, setup.figures, elastic=setup.elastic, bending=False).elastic:
+        return chosen, []
+    chosen.remove(Controller.STEPPER)
+    return chosen, ["stepper: left out, because it is simulated only with elastic gearboxes"]
+
+
+def _check_pictures(loops: str | None, errors: str | None, controllers: "Sequence[Controller]") -> None:
+    """Raise InputError if a picture cannot be drawn or has the wrong ending."""
+    from planner.control.design import Controller
+
+    for name in (loops, errors):
+        if name is not None and not name.endswith(".png"):
+            raise InputError(f"{name}: a picture is written as .png")
+    if loops is not None and list(controllers) == [Controller.STEPPER]:
+        raise InputError("a stepper runs in open loop: it has no Bode diagram")
+
+
+def _write(files: "Outputs", study: "Study", written: dict[str, str]) -> None:
+    """Write the output files of a study, given by kind."""
+    with files:
+        for kind, name in written.items():
+            place = files.temporary(name)
+            if kind == "recording":
+                from planner.recording import write_control_recording
+
+                write_control_recording(place, study)
+            elif kind == "report":
+                from planner.control.picture import study_pictures
+                from planner.reports.document import write_document
+
+                write_document(place, study.to_markdown(), study_pictures(study))
+            else:
+                from planner.control.picture import error_figure, loop_figure, write_figure
+
+                write_figure(place, loop_figure(study) if kind == "loops" else error_figure(study))
 
 
 def _print_study(study: "Study", written: dict[str, str], as_json: bool, whole: bool) -> int:
@@ -210,7 +232,7 @@ def _print_study(study: "Study", written: dict[str, str], as_json: bool, whole: 
     if whole:
         print_lines(None, [ROW_LEGEND])
         if study.designs:
-            click.echo("Loops at the goal, each joint's broken with the others closed")
+            click.echo("Loop margins at the goal, one joint opened at a time, the others closed")
             print_rows(LOOP_HEADER, [cells for design in study.designs for cells in loop_cells(design)])
         print_lines("case", study.reasons)
         print_lines("note", study.notes)
@@ -230,7 +252,7 @@ def _code(study: "Study") -> int:
 
 
 def _several(what: str, text: str, known: Sequence[str]) -> list[str]:
-    """The names of a list with commas, or all of them."""
+    """Return the names of a comma-separated list, or all known names for "all"."""
     names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",")))
     for name in names:
         if name not in known:

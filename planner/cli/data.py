@@ -1,4 +1,4 @@
-"""What the boom and the catalogue hold, and a boom's file to start from."""
+"""The commands that show the boom and the catalogue, and write a boom file to start from."""
 
 from collections.abc import Iterable
 from dataclasses import fields
@@ -22,7 +22,7 @@ _RANKS = ("position", "velocity", "acceleration", "jerk")
 @boom_option
 @json_option
 def info(boom_file: str | None, as_json: bool) -> int:
-    """Show the boom: its joints with their limits and drives, its poses, and how sure each figure is.
+    """Show the boom: joints with limits and drives, poses, and the basis of its figures.
 
     \b
     Example:
@@ -56,7 +56,7 @@ def info(boom_file: str | None, as_json: bool) -> int:
 @boom_option
 @json_option
 def catalogue(boom_file: str | None, as_json: bool) -> int:
-    """Show the catalogue: motors, gearboxes and linear actuators, with what their datasheets print.
+    """Show the motors, gearboxes and linear actuators of the catalogue, with datasheet figures.
 
     \b
     Example:
@@ -98,7 +98,7 @@ def catalogue(boom_file: str | None, as_json: bool) -> int:
 @click.command()
 @click.argument("out", metavar="FILE.toml", type=OutFile(".toml"))
 def new(out: str) -> int:
-    """Write a boom's file to start from: the third-generation boom, every figure with its unit and its source.
+    """Write the file of the third-generation boom, with units and sources, to start from.
 
     \b
     Example:
@@ -176,6 +176,6 @@ def _origin(origin: Origin) -> dict[str, str]:
 
 
 def _plain(entry: Any) -> dict[str, Any]:
-    """An entry's fields in SI, windings as tables of their own."""
+    """Return the fields of an entry in SI, with windings as tables."""
     values = {field.name: getattr(entry, field.name) for field in fields(entry)}
     return {name: _plain(value) if hasattr(value, "__dataclass_fields__") else value for name, value in values.items()}

@@ -1,12 +1,13 @@
-"""Jobs on a duty cycle: check it, and size the drives for it."""
+"""The commands that check a mission and size the drives for it."""
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from boom_model import InfeasibleError, InputError
+from boom_model import Boom, InfeasibleError, InputError
 from boom_model.plausible import VOLTAGE
-from planner.cli.completion import OneOf, joints, missions
+from planner.cli.completion import OneOf, OutFile, joints, missions
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -22,8 +23,17 @@ from planner.cli.options import (
     plausible,
     report_option,
     vehicle_option,
+    with_names,
 )
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
+
+if TYPE_CHECKING:
+    from planner.files import Outputs
+    from planner.missions.mission import Cycle, Mission
+    from planner.motion.vehicle import VehicleCase
+    from planner.planning import Move
+    from planner.reports.report import Report
+    from planner.sizing.choice import Adapt, Choice
 
 
 @click.command()
@@ -33,11 +43,12 @@ from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json
     "joints",
     multiple=True,
     shell_complete=joints,
-    help="Compare the drive checks of this joint alone; may be given again.",
+    help="Compare only the drive checks of this joint; repeatable.",
 )
 @payload_option
 @payload_as_option
 @vehicle_option
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of each distinct leg, for `boom view`.")
 @report_option
 @picture_option
 @boom_option
@@ -49,13 +60,14 @@ def mission(
     payload: float | None,
     payload_as: Any,
     vehicle: str | None,
+    out: str | None,
     picture: str | None,
     document: str | None,
     boom_file: str | None,
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Check a duty cycle of moves, holds and pauses as a whole; several of them side by side.
+    """Check a duty cycle of moves, holds and pauses, or compare several.
 
     MISSION is a FILE.toml, or one of field-day, table-2-4 and table-3-1.
 
@@ -64,49 +76,73 @@ def mission(
       boom mission field-day --picture drives.png
       boom mission table-2-4 table-3-1 --joint inner --joint lower --report judged.pdf
     """
-    from planner.checks.rows import Verdict
-    from planner.missions.mission import check_cycle, load_mission, plan_cycle
-    from planner.planning import torques
-    from planner.reports.answer import answer
-    from planner.reports.document import write_document
-    from planner.reports.drive_pictures import drive_pages, write_drive_picture
-    from planner.reports.side_by_side import compared, loads_side_by_side, side_by_side_markdown
+    from planner.missions.mission import cycle_move, load_mission, plan_cycle
 
     boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
     check_picture(picture)
-    files = outputs(picture, document=document, inputs=(*missions, boom_file, vehicle))
-    if picture is not None and len(missions) > 1:
-        raise InputError(f"--picture {picture}: a page shows one mission, and {len(missions)} are given")
+    files = outputs(out, picture, document=document, inputs=(*missions, boom_file, vehicle))
+    for option, name in (("--picture", picture), ("--out", out)):
+        if name is not None and len(missions) > 1:
+            raise InputError(f"{option} {name}: it shows one mission, and {len(missions)} are given")
     loaded = [load_mission(name) for name in missions]
     cycles = {each.name: plan_cycle(boom, each, case, track=tracked(f"planning {each.name}")) for each in loaded}
     if len(cycles) < len(missions):
-        raise InputError(f"two missions bear one name: {', '.join(each.name for each in loaded)}")
-    reports = {name: check_cycle(boom, cycle, payload_as=payload_as, vehicle=case) for name, cycle in cycles.items()}
-    written: dict[str, str] = {}
-    header, rows = compared(reports, joints)
-    alone = len(reports) == 1 and not joints
-    drawn = {
-        name: (boom, cycle.trajectory, torques(boom, cycle.trajectory, payload_as, case), reports[name], cycle.moves)
-        for name, cycle in (cycles.items() if picture or document else ())
-    }
-    with files:
-        if document is not None:
-            text = next(iter(reports.values())).to_markdown() if alone else side_by_side_markdown(reports, joints)
-            pages = {name: drive_pages(*shown) for name, shown in drawn.items()}
-            titled = {
-                title if alone else f"{name}: {title}": page
-                for name, page_of in pages.items()
-                for title, page in page_of.items()
-            }
-            write_document(files.temporary(document), text, titled)
-            written["report"] = document
-        if picture is not None:
-            write_drive_picture(files.temporary(picture), *next(iter(drawn.values())))
-            written["picture"] = picture
-    if alone:
+        raise InputError(f"two missions have the same name: {', '.join(each.name for each in loaded)}")
+    moves = {name: cycle_move(boom, cycle, payload_as=payload_as, vehicle=case) for name, cycle in cycles.items()}
+    reports = {name: move.report for name, move in moves.items()}
+    written = with_names({"recording": out, "report": document, "picture": picture})
+    _write(files, moves, cycles, joints, written)
+    if len(reports) == 1 and not joints:
         ((name, report),) = reports.items()
         asked = f"mission {name}, {report.duration:.0f} s, payload {boom.payload.mass:g} kg"
         return print_report(report, asked, written, as_json, whole, f"boom size {missions[0]}")
+    return _print_compared(reports, joints, written, as_json, whole)
+
+
+def _write(
+    files: "Outputs",
+    moves: Mapping[str, "Move"],
+    cycles: Mapping[str, "Cycle"],
+    joints: Sequence[str],
+    written: Mapping[str, str],
+) -> None:
+    """Write the recording, the report and the picture of missions, where they have a name."""
+    from planner.reports.document import write_document
+    from planner.reports.drive_pictures import drive_pages, write_drive_picture
+    from planner.reports.side_by_side import side_by_side_markdown
+
+    reports = {name: move.report for name, move in moves.items()}
+    alone, first = len(moves) == 1 and not joints, next(iter(moves.values()))
+    with files:
+        if "recording" in written:
+            from planner.recording import write_recording
+
+            write_recording(files.temporary(written["recording"]), first)
+        drawn = {
+            name: (move.boom, move.trajectory, move.loads.tau, move.report, cycles[name].moves)
+            for name, move in (moves.items() if "report" in written or "picture" in written else ())
+        }
+        if "report" in written:
+            text = first.report.to_markdown() if alone else side_by_side_markdown(reports, joints)
+            titled = {
+                title if alone else f"{name}: {title}": page
+                for name, shown in drawn.items()
+                for title, page in drive_pages(*shown).items()
+            }
+            write_document(files.temporary(written["report"]), text, titled)
+        if "picture" in written:
+            write_drive_picture(files.temporary(written["picture"]), *next(iter(drawn.values())))
+
+
+def _print_compared(
+    reports: Mapping[str, "Report"], joints: Sequence[str], written: dict[str, str], as_json: bool, whole: bool
+) -> int:
+    """Print the reports of missions side by side, and return the exit code."""
+    from planner.checks.rows import Verdict
+    from planner.reports.answer import answer
+    from planner.reports.side_by_side import compared, loads_side_by_side
+
+    header, rows = compared(reports, joints)
     if as_json:
         print_json({"missions": {name: report.to_json({}) for name, report in reports.items()}, "files": written})
     else:
@@ -127,7 +163,7 @@ def mission(
 @click.command()
 @click.argument("mission", default="field-day", shell_complete=missions)
 @click.option(
-    "--joint", "joints", multiple=True, shell_complete=joints, help="Size this joint; may be given again; else every one."
+    "--joint", "joints", multiple=True, shell_complete=joints, help="Joint to size; repeatable. Default: every joint."
 )
 @click.option(
     "--voltage",
@@ -136,7 +172,7 @@ def mission(
     multiple=True,
     callback=plausible(VOLTAGE),
     metavar="V",
-    help="Bus voltage to try; may be given again.",
+    help="Bus voltage to try; repeatable.",
 )
 @click.option(
     "--adapt",
@@ -144,11 +180,11 @@ def mission(
     metavar="nothing|rescale|replan",
     default="nothing",
     show_default=True,
-    help="What may change to suit a drive: the moves slowed evenly, or planned anew.",
+    help="Adapt the motion to each drive: rescale slows every move, replan plans them again.",
 )
 @click.option(
     "--variant", "variants", multiple=True, metavar="BODY=KG,...",
-    help="A boom of other masses beside the given one, payload=KG among them; may be given again.",
+    help="Also size for a boom with other masses, such as inner=5.55,payload=5; repeatable.",
 )  # fmt: skip
 @payload_option
 @payload_as_option
@@ -171,18 +207,76 @@ def size(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Go through the catalogue for each joint: what does not fail, ranked by mass and margin, and why the rest does.
+    """Check every drive of the catalogue on a mission; rank those without a FAIL by mass.
 
     \b
     Example:
       boom size field-day --variant inner=5.55 --variant payload=5 --report drives.html
     """
     from boom_model import JOINTS, Catalogue
-    from planner.missions.mission import check_steady, load_mission, plan_cycle
+    from planner.missions.mission import check_steady, load_mission
+    from planner.sizing.choice import Adapt, choose, parse_variant, too_high
+    from planner.sizing.tables import sizing_json, sizing_notes
+
+    boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
+    files = outputs(document=document, inputs=(mission, boom_file, vehicle))
+    catalogue = Catalogue.load().with_file(given_catalogue())
+    booms = {"as it is": boom} | {text: parse_variant(boom, text) for text in variants}
+    how, asked = Adapt(adapt), load_mission(mission)
+    check_steady(case)
+    work = _work(boom, asked, how, case)
+    choices = choose(booms, work, joints or JOINTS, catalogue, voltages, how, payload_as, tracked("checking drives"), case)
+    notes = sizing_notes(choices, how, case, too_high(catalogue, voltages))
+    written = with_names({"report": document})
+    _write_sizing(files, boom, asked, choices, notes, document)
+    if as_json:
+        print_json(sizing_json(asked.name, choices, notes) | {"files": written})
+    else:
+        print_lines(None, [f"mission {asked.name}, payload {boom.payload.mass:g} kg"])
+        _print_choices(choices, notes, whole)
+        print_files(written)
+        print_lines("next", [] if whole else [f"boom size {mission} --report drives.pdf"])
+    unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]
+    if unmet:
+        complain(f"no drive of the catalogue is suitable for the mission: {'; '.join(unmet)}")
+    return ANSWER_IS_NO if unmet else 0
+
+
+def _work(boom: Boom, mission: "Mission", how: "Adapt", case: "VehicleCase") -> "Cycle | Mission":
+    """Return the cycle of the fitted drives, or the mission if each drive has its own plan."""
+    from planner.missions.mission import plan_cycle
+    from planner.sizing.choice import Adapt
+
+    if how is Adapt.REPLAN:
+        return mission
+    try:
+        return plan_cycle(boom, mission, case, track=tracked("planning the mission"))
+    except InfeasibleError as error:
+        raise InfeasibleError(
+            "the fitted drives cannot do this mission, so there is no motion on which to check the others; --adapt replan "
+            f"plans a motion for each drive: {error}"
+        ) from None
+
+
+def _write_sizing(
+    files: "Outputs", boom: Boom, mission: "Mission", choices: Sequence["Choice"], notes: Sequence[str], document: str | None
+) -> None:
+    """Write the report of a choice of drives, if it has a name."""
     from planner.reports.document import write_document
     from planner.reports.report import assumptions
-    from planner.sizing.choice import Adapt, choose, parse_variant, too_high
     from planner.sizing.pictures import sizing_pictures
+    from planner.sizing.tables import sizing_markdown
+
+    if document is None:
+        return
+    assumed = (*mission.assumptions, *assumptions(boom, mission.jerk_limited))
+    text = sizing_markdown(f"Drives for the mission {mission.name}", choices, notes, assumed)
+    with files:
+        write_document(files.temporary(document), text, sizing_pictures(choices))
+
+
+def _print_choices(choices: Sequence["Choice"], notes: Sequence[str], whole: bool) -> None:
+    """Print the conclusion and the best drive per joint, and with `whole` every drive and note."""
     from planner.sizing.tables import (
         SAVING,
         answer_rows,
@@ -192,56 +286,20 @@ def size(
         not_checked,
         ranking,
         saving,
-        sizing_json,
-        sizing_markdown,
-        sizing_notes,
     )
 
-    boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
-    files = outputs(document=document, inputs=(mission, boom_file, vehicle))
-    catalogue = Catalogue.load().with_file(given_catalogue())
-    booms = {"as it is": boom} | {text: parse_variant(boom, text) for text in variants}
-    how, asked = Adapt(adapt), load_mission(mission)
-    check_steady(case)
-    try:
-        work = asked if how is Adapt.REPLAN else plan_cycle(boom, asked, case, track=tracked("planning the mission"))
-    except InfeasibleError as error:
-        raise InfeasibleError(
-            "the fitted drives cannot do this mission, on whose motion every drive would be judged; --adapt replan plans for "
-            f"each: {error}"
-        ) from None
-    choices = choose(
-        booms, work, joints or JOINTS, catalogue, voltages, how, payload_as, tracked("going through the catalogue"), case
-    )
-    notes = sizing_notes(choices, how, case, too_high(catalogue, voltages))
-    written = {} if document is None else {"report": document}
-    if document is not None:
-        assumed = (*asked.assumptions, *assumptions(boom, asked.jerk_limited))
-        text = sizing_markdown(f"Drives for the mission {asked.name}", choices, notes, assumed)
-        with files:
-            write_document(files.temporary(document), text, sizing_pictures(choices))
-    if as_json:
-        print_json(sizing_json(asked.name, choices, notes) | {"files": written})
-    else:
-        print_lines(None, [f"mission {asked.name}, payload {boom.payload.mass:g} kg"])
-        print_lines(None, conclusion(choices))
-        print_rows(*answer_rows(choices), drop=("fitted", "mass"))
-        if whole:
-            print_rows(SAVING, saving(choices))
-            for choice in (choice for choice in choices if choice.judged):
-                print_lines(None, [f"{choice.joint}, {choice.variant}"])
-                print_rows(*ranking(choice), drop=("warnings", "moving", "mass"))
-                print_lines("no motion with", no_motion(choice))
-                print_lines("every drive has these warnings", choice.warned)
-            print_lines(None, ["each drive in its best supply"])
-            print_rows(*motors(choices))
-            print_lines("note", notes)
-        else:
-            print_lines("not checked", (f"{joints}: {reason}" for joints, reason in not_checked(choices)))
-            print_lines(None, [f"{len(notes)} notes, every drive ranked: --all lists them"])
-        print_files(written)
-        print_lines("next", [] if whole else [f"boom size {mission} --report drives.pdf"])
-    unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]
-    if unmet:
-        complain(f"no drive of the catalogue does the mission: {'; '.join(unmet)}")
-    return ANSWER_IS_NO if unmet else 0
+    print_lines(None, conclusion(choices))
+    print_rows(*answer_rows(choices), drop=("fitted", "mass"))
+    if not whole:
+        print_lines("not checked", (f"{joints}: {reason}" for joints, reason in not_checked(choices)))
+        print_lines(None, [f"{len(notes)} notes, every drive ranked: --all lists them"])
+        return
+    print_rows(SAVING, saving(choices))
+    for choice in (choice for choice in choices if choice.judged):
+        print_lines(None, [f"{choice.joint}, {choice.variant}"])
+        print_rows(*ranking(choice), drop=("warnings", "moving", "mass"))
+        print_lines("no motion with", no_motion(choice))
+        print_lines("every drive has these warnings", choice.warned)
+    print_lines(None, ["each drive in its best supply"])
+    print_rows(*motors(choices))
+    print_lines("note", notes)

@@ -1,4 +1,4 @@
-"""What an exception that ends the command means: one line on standard error, and an exit code."""
+"""Exit code and message for an exception that ends the command."""
 
 import errno
 import os
@@ -13,11 +13,11 @@ from planner.cli.printing import ANSWER_IS_NO, BAD_INPUT, complain
 
 INTERNAL_ERROR, INTERRUPTED = 70, 130
 DEBUG = "BOOM_DEBUG"
-"""Environment variable that asks for the traceback of an internal error."""
+"""Environment variable that turns on the traceback of an internal error."""
 
 
 def failure(error: BaseException) -> int:
-    """Prints one line about the exception; returns the exit code that it stands for."""
+    """Print one line about an exception, and return its exit code."""
     code, message = _meaning(error)
     if code == INTERNAL_ERROR and os.environ.get(DEBUG):
         traceback.print_exception(error)
@@ -35,17 +35,16 @@ def _meaning(error: BaseException) -> tuple[int, str]:
     if isinstance(error, click.Abort | KeyboardInterrupt):
         return INTERRUPTED, "interrupted"
     if isinstance(error, MemoryError | OverflowError | RecursionError | FloatingPointError | RuntimeWarning):
-        return BAD_INPUT, f"the numbers given are beyond what can be computed: {str(error) or type(error).__name__}"
+        return BAD_INPUT, f"a number is too large or too small to compute with: {str(error) or type(error).__name__}"
     if isinstance(error, OSError):
         return BAD_INPUT, _refused(error)
     return INTERNAL_ERROR, (
-        f"internal error: {type(error).__name__}: {error}; please report it with the command, and with what it prints under "
-        f"{DEBUG}=1"
+        f"internal error: {type(error).__name__}: {error}; please report it with the command and its output with {DEBUG}=1"
     )
 
 
 def _refused(error: OSError) -> str:
-    """What the operating system refused; files of the user's own have named themselves before."""
+    """Return the message for an error of the operating system."""
     reason = error.strerror or str(error)
     if error.filename is not None:
         return f"{os.fsdecode(error.filename)}: {reason}"
@@ -56,7 +55,7 @@ def _refused(error: OSError) -> str:
 
 
 def _abandon_output() -> None:
-    """Sends what is still to be written nowhere, so that Python does not try again when it ends."""
+    """Discard buffered output, so that Python does not try to write it again when it ends."""
     with suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.__stdout__.fileno())  # type: ignore[union-attr]

@@ -1,4 +1,4 @@
-"""Exports and imports, and the validation against the thesis."""
+"""The commands that convert and compare motions, export models, and validate the model."""
 
 from typing import Any
 
@@ -24,14 +24,14 @@ from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json
 @click.argument("motion", type=click.Path(), metavar="IN")
 @click.argument("out", metavar="OUT")
 def export(motion: str, out: str) -> int:
-    """Turn a motion into another tool's form, by the ending of OUT.
+    """Convert a motion to the format given by the ending of OUT.
 
     \b
-    .csv          t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, and tau1..tau5 where IN has them
+    .csv          t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, and tau1..tau5 if IN has them
     .parquet      the same columns, with their units
     .yaml, .json  ROS trajectory_msgs/JointTrajectory
 
-    IN is a CSV or Parquet file; its torques go along as they are.
+    IN is a CSV or Parquet file. Its torques are copied unchanged.
 
     \b
     Examples:
@@ -60,9 +60,9 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     """Write the boom, with its payload, as URDF or as MJCF for MuJoCo (.xml).
 
     \b
-    URDF  a tree: mimic joints keep the parallelogram. A torque that a tool computes for a
-          mimic joint belongs to the joint that it mimics.
-    MJCF  the loop closed by a constraint, a motor on each joint, the named poses as keyframes.
+    URDF  a tree; mimic joints keep the parallelogram. A torque that a tool computes for a
+          mimic joint acts on the joint that it mimics.
+    MJCF  a constraint closes the loop; a motor on each joint; the named poses are keyframes.
 
     \b
     Example:
@@ -82,23 +82,23 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
 @click.argument("measured", metavar="MEASURED")
 @click.option(
     "--offset", default="0", show_default=True, metavar="S|best",
-    help="Added to the log's times; best fits them to the plan, and so hides a delay of the drives.",
+    help="Time added to the log. best fits it to the plan, which hides a delay of the drives.",
 )  # fmt: skip
 @click.option(
     "--window",
     type=float,
     callback=plausible(WINDOW),
     metavar="S",
-    help="Width of the filter that differentiates the log; else 0.2 s.",
+    help="Width of the filter that differentiates the log. Default: 0.2 s.",
 )
 @click.option(
     "--tolerance",
     type=float,
     callback=plausible(TIP_ERROR),
     metavar="M",
-    help="Largest tip error allowed.",
+    help="Largest allowed tip error.",
 )
-@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of both, for `boom view`.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording of both for `boom view`.")
 @payload_option
 @payload_as_option
 @boom_option
@@ -117,10 +117,11 @@ def compare(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Hold a measured motion against its plan: where joints and tip were, and what torques that takes.
+    """Compare a measured motion with its plan: joints, tip and torques.
 
-    PLANNED and MEASURED are CSV or Parquet files. MEASURED holds t, q1..q5 in SI, and any of qd1..qd5, qdd1..qdd5 and
-    tau1..tau5; derivatives that it lacks come from a Savitzky-Golay filter, whose noise is reported.
+    PLANNED and MEASURED are CSV or Parquet files. MEASURED has the columns t and q1..q5 in SI, and
+    optionally qd1..qd5, qdd1..qdd5 and tau1..tau5. A Savitzky-Golay filter computes missing
+    derivatives; their noise is reported.
 
     \b
     Example:
@@ -174,7 +175,7 @@ def compare(
 @all_option
 @json_option
 def validate(whole: bool, as_json: bool) -> int:
-    """The thesis's tables 2-5 to 2-8 and 3-2 and its sections 3.5 and 3.6, row by row, against this model.
+    """Compare the model with the thesis, row by row: tables 2-5 to 2-8, 3-2; sections 3.5, 3.6.
 
     \b
     Example:
@@ -209,9 +210,9 @@ def _print_comparison(answer: dict[str, Any], asked: str, verdict: str | None, w
     print_rows(comparison.ANSWER_HEADER, map(comparison.answer_cells, answer["joints"]), drop=("RMS", "at"))
     if whole:
         for title, header, cells in (
-            ("Positions, measured less planned", comparison.POSITION_HEADER, comparison.position_cells),
-            ("Torques of the measured motion less the plan's", comparison.TORQUE_HEADER, comparison.torque_cells),
-            ("Torques of the log less the model's", comparison.LOGGED_HEADER, comparison.logged_cells),
+            ("Positions, measured minus planned", comparison.POSITION_HEADER, comparison.position_cells),
+            ("Torques of the measured motion minus those of the plan", comparison.TORQUE_HEADER, comparison.torque_cells),
+            ("Torques of the log minus those of the model", comparison.LOGGED_HEADER, comparison.logged_cells),
         ):
             click.echo(title)
             print_rows(header, map(cells, answer["joints"]))

@@ -1,12 +1,13 @@
-"""Where the tip can be: inverse kinematics and the reach."""
+"""The commands for inverse kinematics and the workspace."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
 from boom_model import (
     JOINTS,
+    Boom,
     InfeasibleError,
     InputError,
     forward_kinematics,
@@ -30,6 +31,10 @@ from planner.cli.options import (
 from planner.cli.printing import print_files, print_json, print_lines, print_rows
 from planner.paths.targets import TipTarget, parse_pitch, parse_target, unreachable
 
+if TYPE_CHECKING:
+    from boom_model.kinematics.reach import ReachMap
+    from planner.files import Outputs
+
 
 @click.command(context_settings={"ignore_unknown_options": True})
 @click.argument("x", type=float)
@@ -43,7 +48,7 @@ from planner.paths.targets import TipTarget, parse_pitch, parse_target, unreacha
 def ik(
     x: float, y: float, z: float, pitch: str, constraint: str, payload: float | None, boom_file: str | None, as_json: bool
 ) -> int:
-    """List every joint position that puts the tip at X Y Z (m, in the base frame).
+    """List every joint position with the tip at X Y Z (m, in the base frame).
 
     \b
     Example:
@@ -123,7 +128,9 @@ def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
 @pitch_option
 @constraint_option
 @payload_option
-@click.option("--out", default="reach.png", show_default=True, metavar="FILE.png|FILE.rrd", help="The picture or recording.")
+@click.option(
+    "--out", default="reach.png", show_default=True, metavar="FILE.png|FILE.rrd", help="Picture or recording to write."
+)
 @boom_option
 @json_option
 def reach(pitch: str, constraint: str, payload: float | None, out: str, boom_file: str | None, as_json: bool) -> int:
@@ -142,53 +149,68 @@ def reach(pitch: str, constraint: str, payload: float | None, out: str, boom_fil
         raise InputError("pitch free: a reach map is drawn for one pitch")
     files = outputs(out, inputs=(boom_file,))
     found = reach_map(boom, chosen, angle)
-    row, column = np.nonzero(found.within_limits)
-    answer: dict[str, Any] = {
-        "hold": str(chosen),
-        "pitch_rad": angle,
-        "payload_kg": boom.payload.mass,
-        "cells": found.exists.size,
-        "exists": int(found.exists.sum()),
-        "within_limits": len(row),
-        "overloaded": int((found.torque_margin < 0.0).sum()),
-        "files": {},
-    }
-    if not len(row):
+    answer: dict[str, Any] = {"hold": str(chosen), "pitch_rad": angle, "payload_kg": boom.payload.mass} | _counts(found)
+    if not answer["within_limits"]:
         reason = f"no tip position with pitch {np.degrees(angle):.4g} deg and constraint {chosen} is within the limits"
         if as_json:
             print_json(answer | {"reason": reason})
         raise InfeasibleError(reason)
+    answer |= {"files": _write_reach(files, out, boom, found)} | _extents(found)
+    if as_json:
+        print_json(answer)
+    else:
+        _print_reach(answer)
+    return 0
+
+
+def _counts(found: "ReachMap") -> dict[str, Any]:
+    """Return the numbers of cells of a reach map."""
+    return {
+        "cells": found.exists.size,
+        "exists": int(found.exists.sum()),
+        "within_limits": int(found.within_limits.sum()),
+        "overloaded": int((found.torque_margin < 0.0).sum()),
+        "files": {},
+    }
+
+
+def _extents(found: "ReachMap") -> dict[str, Any]:
+    """Return the largest and smallest values over the cells within the limits."""
+    row, column = np.nonzero(found.within_limits)
     margin = found.torque_margin[row, column]
     known = bool(np.isfinite(margin).all())
-    answer |= {
+    return {
         "largest_r_m": float(np.abs(found.r[column]).max()),
         "lowest_z_m": float(found.z[row].min()),
         "highest_z_m": float(found.z[row].max()),
         "least_torque_margin": float(margin.min()) if known else None,
         "largest_torque_margin": float(margin.max()) if known else None,
     }
+
+
+def _write_reach(files: "Outputs", out: str, boom: Boom, found: "ReachMap") -> dict[str, str]:
+    """Write the picture or the recording of a reach map; return its name by kind."""
     with files:
         if out.endswith(".png"):
             from planner.reports.reach_picture import reach_title, write_reach_picture
 
             write_reach_picture(files.temporary(out), boom, found, reach_title(boom, found))
-            answer["files"] = {"picture": out}
-        else:
-            from planner.recording import write_reach_recording
+            return {"picture": out}
+        from planner.recording import write_reach_recording
 
-            write_reach_recording(files.temporary(out), boom, found)
-            answer["files"] = {"recording": out}
-    if as_json:
-        print_json(answer)
-        return 0
+        write_reach_recording(files.temporary(out), boom, found)
+        return {"recording": out}
+
+
+def _print_reach(answer: dict[str, Any]) -> None:
     print_lines(
         None,
         [
-            f"{answer['within_limits']} of {answer['cells']} cells are reached within the limits: r up to "
+            f"{answer['within_limits']} of {answer['cells']} cells are reachable within the limits: r up to "
             f"{answer['largest_r_m']:.2f} m, z from {answer['lowest_z_m']:.2f} to {answer['highest_z_m']:.2f} m"
         ],
     )
-    if known:
-        click.echo(f"torque margin {margin.min():.3f} to {margin.max():.3f}; {answer['overloaded']} cells overload a drive")
+    least, largest = answer["least_torque_margin"], answer["largest_torque_margin"]
+    if least is not None:
+        click.echo(f"torque margin {least:.3f} to {largest:.3f}; {answer['overloaded']} cells overload a drive")
     print_files(answer["files"])
-    return 0

@@ -1,4 +1,4 @@
-"""The design of a link."""
+"""The command that designs a link."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -19,6 +19,7 @@ from planner.cli.options import (
     payload_as_option,
     payload_option,
     report_option,
+    with_names,
 )
 from planner.cli.printing import print_files, print_json, print_lines, print_rows, tracked
 from planner.paths.targets import parse_target
@@ -33,10 +34,10 @@ _Command = Callable[..., Any]
 
 _TASK_OPTIONS: tuple[Callable[[_Command], _Command], ...] = (
     click.option(
-        "--link", "name", default="inner", show_default=True, metavar="inner|lower|outer|extension", help="Which link."
+        "--link", "name", default="inner", show_default=True, metavar="inner|lower|outer|extension", help="Link to design."
     ),
     click.option(
-        "--links", type=click.Path(), metavar="FILE.toml", help="Plates and fittings of your own links; else the shipped ones."
+        "--links", type=click.Path(), metavar="FILE.toml", help="File of plates and fittings; default: the shipped one."
     ),
     click.option(
         "--load",
@@ -44,7 +45,7 @@ _TASK_OPTIONS: tuple[Callable[[_Command], _Command], ...] = (
         metavar="moves|thesis",
         default="moves",
         show_default=True,
-        help="Every instant of the moves, or the thesis's load case.",
+        help="moves: every sample of the moves. thesis: the load case of the thesis.",
     ),
     click.option(
         "--method",
@@ -52,38 +53,52 @@ _TASK_OPTIONS: tuple[Callable[[_Command], _Command], ...] = (
         metavar="exact|thesis",
         default="exact",
         show_default=True,
-        help="Least mass by its optimality conditions, or the thesis's two-stage search.",
+        help="exact: least mass by optimality conditions. thesis: two-stage search of the thesis.",
     ),
     click.option(
         "--largest-components",
         is_flag=True,
-        help="Each load component's largest at once, as the thesis does, not every instant.",
+        help="Combine the largest value of each load component in one case, as in the thesis.",
     ),
     payload_as_option,
     click.option(
-        "--material", default="steel", show_default=True, metavar="steel|aluminium|cfrp", help="cfrp is assumed data."
+        "--material",
+        default="steel",
+        show_default=True,
+        metavar="steel|aluminium|cfrp",
+        help="Material; the data of cfrp are assumed.",
     ),
-    click.option("--thickness", type=float, metavar="M", help="Of one plate; else the link's own."),
-    click.option("--safety-factor", type=float, default=2.0, show_default=True, help="Against yield and buckling."),
+    click.option("--thickness", type=float, metavar="M", help="Thickness of one plate; default: that of the link."),
+    click.option(
+        "--safety-factor", type=float, default=2.0, show_default=True, help="Safety factor against yield and buckling."
+    ),
     click.option("--deflection", type=float, default=0.01, show_default=True, metavar="M", help="Largest deflection."),
-    click.option("--min-height", type=float, default=0.0, show_default=True, metavar="M", help="Of the plates."),
-    click.option("--max-height", type=float, metavar="M", help="Of the plates; else free."),
-    click.option("--max-taper", type=float, metavar="RATIO", help="Largest change of height over length; else free."),
-    click.option("--frozen", is_flag=True, help="Exact method: freeze the moments as the thesis does, and leave out shear."),
+    click.option(
+        "--min-height", type=float, default=0.0, show_default=True, metavar="M", help="Smallest height of the plates."
+    ),
+    click.option("--max-height", type=float, metavar="M", help="Largest height of the plates; default: no limit."),
+    click.option("--max-taper", type=float, metavar="RATIO", help="Largest change of height per length; default: no limit."),
+    click.option(
+        "--frozen",
+        is_flag=True,
+        help="Exact method: keep the moments of the first stage, as in the thesis, and leave out shear.",
+    ),
     click.option(
         "--shear/--no-shear",
         default=None,
-        help="Exact method: whether shear counts in the deflection; else for the loads of moves, not for the thesis's.",
+        help="Exact method: include shear in the deflection. Default: yes for --load moves, no for thesis.",
     ),
-    click.option("--no-buckling", is_flag=True, help="Exact method: do not hold the safety factor against buckling."),
-    click.option("--slices", type=int, default=1000, show_default=True, help="Along the link."),
-    click.option("--step", type=float, default=1e-4, show_default=True, metavar="M", help="Thesis's method: its delta-H."),
+    click.option("--no-buckling", is_flag=True, help="Exact method: leave out the buckling constraint."),
+    click.option("--slices", type=int, default=1000, show_default=True, help="Number of slices along the link."),
+    click.option(
+        "--step", type=float, default=1e-4, show_default=True, metavar="M", help="Thesis method: height step delta-H."
+    ),
 )
-"""Options that are fields of `LinkTask`, or their opposites."""
+"""Options for the fields of `LinkTask`, some of them negated."""
 
 
 def task_options(command: _Command) -> _Command:
-    """Give a command the options of a `LinkTask`; it gets them as `task`."""
+    """Add the options of a `LinkTask` to a command, which receives them as `task`."""
 
     @wraps(command)
     def run(name: str, frozen: bool, no_buckling: bool, **given: Any) -> Any:
@@ -100,28 +115,30 @@ def task_options(command: _Command) -> _Command:
 
 @click.command()
 @task_options
-@click.option(
-    "--move", "moves", nargs=2, multiple=True, metavar="START GOAL", help="A move that loads the link; may be given again."
-)
+@click.option("--move", "moves", nargs=2, multiple=True, metavar="START GOAL", help="Move that loads the link; repeatable.")
 @click.option(
     "--motion",
     "motions",
     type=click.Path(),
     multiple=True,
     metavar="FILE.csv",
-    help="A motion that loads the link; may be given again.",
+    help="Motion that loads the link; repeatable.",
 )
 @payload_option
-@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of the design.")
-@click.option("--picture", metavar="FILE.png", help="Contour, stress, convergence, torque and mass.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording of the design.")
+@click.option("--picture", metavar="FILE.png", help="Write a picture with contour, stress, convergence, torque and mass.")
 @report_option
-@click.option("--convergence", is_flag=True, help="Studies by slices, delta-H and elements, in the JSON.")
-@click.option("--contour", metavar="FILE.txt", help="x, H/2, 0 for a CAD curve.")
+@click.option("--convergence", is_flag=True, help="Add convergence studies over slices, delta-H and elements to the JSON.")
+@click.option("--contour", metavar="FILE.txt", help="Write the contour as lines of x, H/2, 0 for a CAD curve.")
 @click.option(
-    "--csv", "csv_file", type=OutFile(".csv"), metavar="FILE.csv", help="Heights, sections, forces and stress at the stations."
+    "--csv",
+    "csv_file",
+    type=OutFile(".csv"),
+    metavar="FILE.csv",
+    help="Write heights, sections, forces and stress at the stations.",
 )
-@click.option("--dxf", metavar="FILE.dxf", help="Outline of one plate in millimetres.")
-@click.option("--out-boom", metavar="FILE.toml", help="The boom with the new link, for `boom plan --boom`.")
+@click.option("--dxf", metavar="FILE.dxf", help="Write the outline of one plate in millimetres.")
+@click.option("--out-boom", metavar="FILE.toml", help="Write the boom with the new link, for `boom plan --boom`.")
 @boom_option
 @all_option
 @json_option
@@ -142,10 +159,11 @@ def link(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Design a link: the least mass that holds stress, deflection and buckling, and what it does to the joint's torque.
+    """Design the lightest link within limits on stress, deflection and buckling.
 
-    Without --move and --motion the moves are transport to phenotyping with every profile, each in its least time; for the
-    thesis's load its own, a cubic of 5 s.
+    The output includes the change of joint torque. Without --move and --motion, the moves are
+    transport to phenotyping with every profile in its shortest time. For --load thesis, the move is
+    that of the thesis, a cubic of 5 s.
 
     \b
     Examples:
@@ -158,7 +176,7 @@ def link(
 
     named = {"recording": out, "picture": picture, "contour": contour, "csv": csv_file, "dxf": dxf, "boom": out_boom}
     if convergence and not as_json:
-        raise InputError("--convergence is part of the JSON: give --json with it, or --picture")
+        raise InputError("--convergence is part of the JSON: add --json, or use --picture")
     if picture is not None and not picture.endswith(".png"):
         raise InputError(f"{picture}: a picture is written as .png")
     files = outputs(*named.values(), document=document, inputs=(boom_file, task.links, *motions))
@@ -172,14 +190,14 @@ def link(
             asked = {"link": task.link, "load": task.load, "method": task.method}
             print_json({**asked, "mass_kg": None, "files": {}, "reason": str(error)})
         raise
-    written = {kind: file for kind, file in (named | {"report": document}).items() if file is not None}
+    written = with_names(named | {"report": document})
     _write(files, design, written, boom_file)
     _print_design(design, written, whole, as_json, convergence)
     return 0
 
 
 def _loading(boom: Boom, moves: Sequence[tuple[str, str]], motions: Sequence[str], planning: Any) -> list["Trajectory"]:
-    """The motions that load the link: those of files, and the given moves with every profile."""
+    """Return the motions that load the link: from files, and from moves with every profile."""
     from planner.motion.motion_files import read_motion
     from planner.planning import plan_each_profile
 
@@ -190,7 +208,7 @@ def _loading(boom: Boom, moves: Sequence[tuple[str, str]], motions: Sequence[str
 
 
 def _write(files: "Outputs", design: "LinkDesign", written: dict[str, str], boom_file: str | None) -> None:
-    """Write each file of a design that has a name."""
+    """Write the output files of a design, given by kind."""
     from planner.links import files as link_files
 
     writers = {

@@ -1,4 +1,4 @@
-"""Jobs on one move: plan it, compare its profiles, its torques, and the checks of any motion."""
+"""The commands that plan a move, compare profiles, and compute torques and checks of a motion."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
@@ -24,6 +24,7 @@ from planner.cli.options import (
     picture_option,
     report_option,
     vehicle_option,
+    with_names,
 )
 from planner.cli.printing import (
     ANSWER_IS_NO,
@@ -59,13 +60,13 @@ _LEAST_ASKED = ("motor speed", "acceleration", "velocity", "jerk")
     default="move.rrd",
     show_default=True,
     metavar="FILE.rrd",
-    help="The recording, for `boom view`.",
+    help="Recording to write, for `boom view`.",
 )
-@click.option("--csv", "csv_file", type=OutFile(".csv"), metavar="FILE.csv", help="The motion with its torques.")
+@click.option("--csv", "csv_file", type=OutFile(".csv"), metavar="FILE.csv", help="Write the motion with its torques.")
 @report_option
 @picture_option
 @click.option("--view", "then_view", is_flag=True, help="Open the recording in the viewer.")
-@click.option("--show-reach", is_flag=True, help="Draw the workspace under --pitch and --constraint in the recording.")
+@click.option("--show-reach", is_flag=True, help="Add the workspace with --pitch and --constraint to the recording.")
 @boom_option
 @all_option
 @json_option
@@ -84,8 +85,8 @@ def plan(
 ) -> int:
     """Plan a move, check it against limits and drives, and record it.
 
-    START and GOAL are a named pose (transport, phenotyping), a joint position q=YAW,INNER,LOWER,EXTENSION,WRIST, or a tip
-    target tip=X,Y,Z.
+    START and GOAL are a named pose (transport, phenotyping), a joint position
+    q=YAW,INNER,LOWER,EXTENSION,WRIST, or a tip target tip=X,Y,Z.
 
     \b
     Examples:
@@ -107,16 +108,16 @@ def plan(
     if report.verdict == "FAIL":
         report = replace(report, suggestions=_fixes(boom, spec))
     written = {"recording": out, "csv": csv_file, "picture": picture, "report": document}
-    _write(files, planned, report, written, spec if show_reach else None)
+    _write(files, planned, report, written, f"{move.start} to {move.goal}", spec if show_reach else None)
     asked = f"{move.start} to {move.goal}, {report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg"
-    code = print_report(report, asked, _given(written), as_json, whole, f"boom view {out}")
+    code = print_report(report, asked, with_names(written), as_json, whole, f"boom view {out}")
     if then_view:
         show(out)
     return code
 
 
 def _planned(boom: Boom, spec: MoveSpec, as_json: bool) -> "Move":
-    """The planned move; where there is none, the changes that would make it possible are printed first."""
+    """Return the planned move. If it is infeasible, print the possible fixes and raise."""
     from planner.planning import plan_move
 
     try:
@@ -138,9 +139,17 @@ def _fixes(boom: Boom, spec: MoveSpec) -> tuple[str, ...]:
 
 
 def _write(
-    files: "Outputs", move: "Move", report: "Report", written: dict[str, str | None], workspace: MoveSpec | None = None
+    files: "Outputs",
+    move: "Move",
+    report: "Report",
+    written: dict[str, str | None],
+    title: str,
+    workspace: MoveSpec | None = None,
 ) -> None:
-    """Write the files of a move that have a name; with the workspace of a description, it is in the recording."""
+    """Write the output files of a move, where they have a name.
+
+    The recording includes the workspace of a description, if one is given.
+    """
     from planner.motion.trajectory import write_csv
 
     recording, csv_file, picture, document = (written.get(kind) for kind in ("recording", "csv", "picture", "report"))
@@ -159,10 +168,18 @@ def _write(
         if document is not None:
             from planner.reports.document import write_document
             from planner.reports.drive_pictures import drive_pages
+            from planner.reports.first_page import first_page, first_picture
             from planner.reports.move_pictures import move_pictures
 
             pages = move_pictures(*shown, move.loads.tau) | drive_pages(*shown, move.loads.tau, report)
-            write_document(files.temporary(document), report.to_markdown(), pages)
+            first = first_page(title, _circumstances(move, report), report), first_picture(*shown, move.loads.tau)
+            write_document(files.temporary(document), report.details(), pages, first)
+
+
+def _circumstances(move: "Move", report: "Report") -> str:
+    """Return profile, duration, payload and vehicle of a move in a line."""
+    vehicle = "level ground" if move.vehicle.is_level else move.vehicle.sentence
+    return f"{report.profile}, {report.duration:.3f} s, payload {move.boom.payload.mass:g} kg, {vehicle}"
 
 
 def _workspace(boom: Boom, spec: MoveSpec | None) -> Any:
@@ -173,16 +190,10 @@ def _workspace(boom: Boom, spec: MoveSpec | None) -> Any:
     return reach_map(boom, spec.constraint, spec.pitch)
 
 
-def _given(written: dict[str, str | None]) -> dict[str, str]:
-    return {kind: name for kind, name in written.items() if name is not None}
-
-
 @click.command(context_settings={"ignore_unknown_options": True})
 @move_options("profile", "via_velocity", "along", "duration", "jerk_bound", "average_torque", "rate", "vehicle")
 @payload_option
-@click.option(
-    "--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of all of them over each other, for `boom view`."
-)
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording with all profiles for `boom view`.")
 @boom_option
 @json_option
 def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file: str | None, as_json: bool) -> int:
@@ -224,7 +235,7 @@ def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file:
 
 
 def _quickest(move: MoveWords, rows: Sequence["ProfileRow"]) -> list[str]:
-    """The command that plans the quickest profile without a FAIL, if there is one."""
+    """Return the command that plans the quickest profile without a FAIL, if there is one."""
     possible = [row for row in rows if row.verdict != "FAIL"]
     if not possible:
         return []
@@ -235,15 +246,16 @@ def _quickest(move: MoveWords, rows: Sequence["ProfileRow"]) -> list[str]:
 
 @click.command()
 @click.argument("motion", type=click.Path(), metavar="IN")
-@click.option("--out", required=True, metavar="OUT", help="The motion with its torques: .csv, .parquet, .yaml or .json.")
+@click.option("--out", required=True, metavar="OUT", help="Motion with torques to write: .csv, .parquet, .yaml or .json.")
 @payload_option
 @payload_as_option
 @boom_option
 @json_option
 def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_file: str | None, as_json: bool) -> int:
-    """Compute the torque of each joint at each sample of a motion, with friction where the boom's file gives it.
+    """Compute the torque of each joint at each sample of a motion.
 
-    IN is a CSV or Parquet file that holds t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t, q1..q5 alone.
+    Torques include friction if the boom file has friction data. IN is a CSV or Parquet file with
+    the columns t, q1..q5, qd1..qd5, qdd1..qdd5 in SI, or t and q1..q5 only.
 
     \b
     Example:
@@ -278,7 +290,7 @@ def torque(motion: str, out: str, payload: float | None, payload_as: Any, boom_f
 @payload_option
 @payload_as_option
 @vehicle_option
-@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of the motion, for `boom view`.")
+@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording of the motion for `boom view`.")
 @report_option
 @picture_option
 @boom_option
@@ -296,7 +308,9 @@ def check(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Check any motion against the joint limits and the drives' datasheets. IN is a CSV or Parquet file.
+    """Check a motion against joint limits and drive datasheets.
+
+    IN is a CSV or Parquet file.
 
     \b
     Example:
@@ -311,8 +325,8 @@ def check(
     boom = load_boom(boom_file, payload)
     move = check_motion(boom, read_motion(motion), payload_as=payload_as, vehicle=load_vehicle(vehicle))
     written = {"recording": out, "picture": picture, "report": document}
-    _write(files, move, move.report, written)
+    _write(files, move, move.report, written, f"Motion of {motion}")
     asked = f"{motion}, {move.report.duration:.3f} s, payload {boom.payload.mass:g} kg"
     carried = "" if payload is None else f" --payload {payload:g}"
     then = f"boom check {motion}{carried} --out checked.rrd" if out is None else f"boom view {out}"
-    return print_report(move.report, asked, _given(written), as_json, whole, then)
+    return print_report(move.report, asked, with_names(written), as_json, whole, then)

@@ -1,6 +1,6 @@
-"""Options that several commands share, and what they stand for."""
+"""Options that several commands share, and the objects that they name."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, fields
 from functools import wraps
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ _Command = Callable[..., Any]
 
 
 def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any], Any]:
-    """Return a callback that refuses an option's number beyond the bounds of a quantity; None passes."""
+    """Return a callback that refuses a number outside the range of a quantity; None is accepted."""
 
     def within(_: click.Context, parameter: click.Parameter, value: Any) -> Any:
         if value is not None:
@@ -41,7 +41,13 @@ _COMPLETE = {"via": targets, "constraint": constraints, "vehicle": vehicles}
 
 
 def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -> Callable[[_Command], _Command]:
-    """Return the option of a field of `MoveWords`, by the field's own description."""
+    """Return the option of a field of `MoveWords`, made from the description of the field.
+
+    Args:
+        name: the field.
+        default: replaces the default of the field.
+        help: replaces the help text of the field.
+    """
     field = _WORDS[name]
     word: Word = field.metadata["word"]
     standard = field.default if default is MISSING else default
@@ -60,7 +66,13 @@ def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -
 
 
 def move_options(*left_out: str) -> Callable[[_Command], _Command]:
-    """Give a command START, GOAL and every option of a move but those left out; it gets them as `move: MoveWords`."""
+    """Return a decorator that adds START, GOAL and the options of a move to a command.
+
+    The command receives them as `move: MoveWords`.
+
+    Args:
+        *left_out: fields of `MoveWords` that are not options of this command.
+    """
     names = [name for name in _WORDS if name not in left_out]
 
     def decorate(command: _Command) -> _Command:
@@ -79,7 +91,7 @@ def move_options(*left_out: str) -> Callable[[_Command], _Command]:
 
 
 _boom_option = click.option(
-    "--boom", "boom_file", type=click.Path(), metavar="FILE.toml", help="A boom of your own; otherwise the shipped one."
+    "--boom", "boom_file", type=click.Path(), metavar="FILE.toml", help="File of a boom; default: the shipped one."
 )
 _catalogue_option = click.option(
     "--catalogue",
@@ -87,37 +99,40 @@ _catalogue_option = click.option(
     metavar="FILE.toml",
     expose_value=False,
     callback=lambda context, _, value: context.meta.update({_CATALOGUE: value}),
-    help="Motors, gearboxes and actuators of your own, beside the shipped ones.",
+    help="More motors, gearboxes and actuators, besides the shipped ones.",
 )
 
 
 def boom_option(command: _Command) -> _Command:
-    """Add --boom, and --catalogue, which `load_boom` finds in the context: whoever names a drive may have brought it."""
+    """Add --boom and --catalogue to a command.
+
+    `load_boom` reads --catalogue from the context, because a boom may name drives of that file.
+    """
     return _boom_option(_catalogue_option(command))
 
 
-payload_option = click.option("--payload", type=float, metavar="KG", help="Mass at the tip; otherwise the boom's own.")
+payload_option = click.option("--payload", type=float, metavar="KG", help="Payload mass; default: that of the boom file.")
 payload_as_option = click.option(
     "--payload-as", type=OneOf(["mass", "force"]), metavar="mass|force", default="mass", show_default=True,
-    help="Accelerate the payload with the tip, or only hang its weight there, as the thesis does.",
+    help="mass: the payload moves with the tip. force: only its weight acts there, as in the thesis.",
 )  # fmt: skip
-json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on standard output, in SI.")
-all_option = click.option("--all", "whole", is_flag=True, help="Every row, every assumption and every note.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output, in SI.")
+all_option = click.option("--all", "whole", is_flag=True, help="Print every row, assumption and note.")
 report_option = click.option(
     "--report",
     "document",
     type=click.Path(),
     metavar="FILE.md|.html|.pdf",
-    help="The report as a document, with pictures, versions and command.",
+    help="Write the report, with pictures, versions and command.",
 )
 vehicle_option = word_option("vehicle")
 pitch_option = word_option("pitch")
 constraint_option = word_option("constraint")
-picture_option = click.option("--picture", metavar="FILE.png", help="The drives as a page of pictures.")
+picture_option = click.option("--picture", metavar="FILE.png", help="Write a page with plots of the drives.")
 
 
 def given_catalogue() -> str | None:
-    """Return what --catalogue names."""
+    """Return the file of --catalogue."""
     name: str | None = click.get_current_context().meta.get(_CATALOGUE)
     return name
 
@@ -129,14 +144,14 @@ def load_boom(boom_file: str | None, payload: float | None = None) -> Boom:
 
 
 def load_vehicle(vehicle: str | None) -> "VehicleCase":
-    """Return the case of --vehicle; otherwise the vehicle rests on level ground."""
+    """Return the case of --vehicle; without it, a vehicle at rest on level ground."""
     from planner.motion.vehicle import LEVEL, load_case
 
     return LEVEL if vehicle is None else load_case(vehicle)
 
 
 def doubts(spec: MoveSpec) -> tuple[str, ...]:
-    """Return what the options given are not likely to mean: a constraint of no tip target, a pitch in radians."""
+    """Return warnings: a constraint or pitch without a tip target, or a pitch in radians."""
     source, given = click.get_current_context().get_parameter_source, []
     if not any(isinstance(target, TipTarget) for target in spec.targets):
         given = [f"--{name} has no effect: no target is a tip=X,Y,Z" for name in ("constraint", "pitch")
@@ -145,7 +160,7 @@ def doubts(spec: MoveSpec) -> tuple[str, ...]:
 
 
 def pitch_doubts(pitch: float | None) -> tuple[str, ...]:
-    """Return that a pitch [rad] looks as if its degrees were radians."""
+    """Return a warning if the degrees of a pitch [rad] are probably meant as radians."""
     if pitch is None:
         return ()
     degrees = float(np.degrees(pitch))
@@ -156,16 +171,22 @@ def pitch_doubts(pitch: float | None) -> tuple[str, ...]:
 
 
 def check_picture(picture: str | None) -> None:
-    """Refuse a name that the drives' page cannot have, before the work."""
+    """Raise InputError if --picture is not a .png file."""
     if picture is not None and not picture.endswith(".png"):
-        raise InputError(f"{picture}: the drives' page is written as .png")
+        raise InputError(f"{picture}: the page of the drives is written as .png")
 
 
 def outputs(*files: str | None, document: str | None = None, inputs: Iterable[str | None] = ()) -> "Outputs":
-    """Return what the command writes, its report last, checked before the work; see `Outputs`.
+    """Return the output files of a command, the report last. Their names are checked here.
+
+    Args:
+        *files: names of files; None stands for no file.
+        document: name of the report.
+        inputs: files that the command reads.
 
     Raises:
-        InputError: as `Outputs`, a report cannot have that name, or a file has the name of one of its pictures.
+        InputError: as `Outputs`; or the report has an unknown ending, or a file has the name of one
+            of the report's pictures.
     """
     from planner.files import Outputs
     from planner.reports.document import is_picture_of, require_form
@@ -179,3 +200,8 @@ def outputs(*files: str | None, document: str | None = None, inputs: Iterable[st
     written = Outputs(*files, document, inputs=read)
     click.get_current_context().meta[REPLACED] = written.replaced
     return written
+
+
+def with_names(files: Mapping[str, str | None]) -> dict[str, str]:
+    """Return the files that have a name, by kind."""
+    return {kind: name for kind, name in files.items() if name is not None}

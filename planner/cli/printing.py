@@ -1,4 +1,4 @@
-"""What the commands print: tables, sentences, JSON, complaints and progress."""
+"""Printing of tables, lines, JSON, error messages and progress."""
 
 import io
 import json
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _FEW_NOTES = 3
-_BETWEEN = 2  # columns between two cells
+_BETWEEN = 2  # spaces between two cells
 _SHORT = 18
-"""Cells of up to this many characters are kept on one line."""
+"""Largest number of characters of a cell that is never folded."""
 _LOUD = "boom.stdout"
 REPLACED = "boom.replaced"
-"""Key of the context under which stand the names of files that were there before."""
+"""Key of the context for the names of files that existed before."""
 
 STYLES = {
     "FAIL": "bold red",
@@ -38,15 +38,15 @@ STYLES = {
 def print_report(
     report: "Report", asked: str, written: Mapping[str, str], as_json: bool, whole: bool = False, then: str | None = None
 ) -> int:
-    """Print what a report says first, all of it, or its JSON; return the exit code.
+    """Print a report, and return the exit code.
 
     Args:
-        report: what was checked.
-        asked: what was asked for, in a line.
-        written: the files, by kind.
-        as_json: print JSON instead.
-        whole: print every row, assumption and note.
-        then: the next command to try.
+        report: the report.
+        asked: the request in one line.
+        written: output files by kind.
+        as_json: whether to print JSON instead of text.
+        whole: whether to print every row, assumption and note, instead of a summary.
+        then: a command to try next.
     """
     from planner.checks.rows import Verdict
 
@@ -121,10 +121,10 @@ def print_rows(
 
     Args:
         header: names of the columns.
-        rows: cells.
-        drop: columns to leave out where the table is too wide, the first of them first.
-        styles: of each row.
-        ends: whether a row ends a section.
+        rows: cells of each row.
+        drop: columns to leave out, in this order, if the table is too wide.
+        styles: style of each row.
+        ends: whether each row ends a section.
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
@@ -144,12 +144,15 @@ def print_rows(
 
 
 def _folds(rows: Sequence[Sequence[str]], column: int) -> bool:
-    """Whether a column holds text, which may fold; a number may not."""
+    """Return whether a column may be folded, because it has long text."""
     return max((len(row[column]) for row in rows), default=0) > _SHORT
 
 
 def _fitting(header: Sequence[str], rows: Sequence[Sequence[str]], drop: Sequence[str], width: int) -> list[int]:
-    """The columns that fit a width; text folds down to its longest word before a column is left out."""
+    """Return the columns that fit a width.
+
+    Text is folded down to its longest word before a column is left out.
+    """
 
     def needed(i: int) -> int:
         column = [header[i], *(row[i] for row in rows)]
@@ -169,33 +172,33 @@ def _fitting(header: Sequence[str], rows: Sequence[Sequence[str]], drop: Sequenc
 
 
 def print_lines(title: str | None, lines: Iterable[str]) -> None:
-    """Print each line, after its title where there is one, folded to the console."""
+    """Print each line, after the title if there is one, folded to the width of the console."""
     console = new_console()
     for line in lines:
         console.print(line if title is None else f"{title}: {line}", highlight=False)
 
 
 def print_files(written: Mapping[str, str]) -> None:
-    """Print what was written, by kind, and whether it took the place of another file; a name is never folded."""
+    """Print the output files by kind, and whether each replaced a file. Names are never folded."""
     replaced = click.get_current_context().meta.get(REPLACED, ())
     for kind, name in written.items():
         click.echo(f"{kind}: {name}{', replaced' if name in replaced else ''}")
 
 
 def print_json(answer: dict[str, Any]) -> None:
-    """Prints one JSON object, even where --quiet is given."""
+    """Print one JSON object, even with --quiet."""
     out = click.get_current_context().meta.get(_LOUD, sys.stdout)
     click.echo(json.dumps(answer, allow_nan=False, indent=2), file=out)
 
 
 def complain(message: str) -> None:
-    """Prints one line on standard error, where that can be written."""
+    """Print one line on standard error, if that can be written."""
     with suppress(OSError):
         click.echo(f"boom: {' '.join(message.split())}", err=True)
 
 
 def tracked(title: str) -> Callable[[list[Any]], Iterable[Any]]:
-    """Iteration with a progress bar on standard error, where that is a terminal."""
+    """Return a `Track` with a progress bar on standard error, if that is a terminal."""
 
     def track(steps: list[Any]) -> Iterable[Any]:
         from rich.console import Console
@@ -207,12 +210,12 @@ def tracked(title: str) -> Callable[[list[Any]], Iterable[Any]]:
 
 
 def is_quiet() -> bool:
-    """Whether --quiet is given."""
+    """Return whether --quiet is given."""
     return _LOUD in click.get_current_context().meta
 
 
 def quieten(ctx: click.Context, _: click.Parameter, quiet: bool) -> None:
-    """Standard output goes nowhere until the command ends; JSON, which was asked for, still goes out."""
+    """Discard standard output until the command ends, except for JSON."""
     if not quiet or _LOUD in ctx.meta:
         return
     ctx.meta[_LOUD], nowhere = sys.stdout, io.StringIO()
@@ -220,7 +223,7 @@ def quieten(ctx: click.Context, _: click.Parameter, quiet: bool) -> None:
 
 
 def new_console() -> "Console":
-    """Return a console as wide as the terminal or COLUMNS, and of 80 columns in a pipe."""
+    """Return a console as wide as the terminal or COLUMNS, or 80 columns wide in a pipe."""
     from rich.console import Console
 
-    return Console(markup=False, soft_wrap=False)  # a unit in brackets is no style
+    return Console(markup=False, soft_wrap=False)  # a unit in brackets is not markup

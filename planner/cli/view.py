@@ -1,4 +1,4 @@
-"""Show recordings: in the Rerun viewer, or in a browser."""
+"""The command that shows a recording in the Rerun viewer or in a browser."""
 
 import os
 import subprocess
@@ -16,9 +16,9 @@ _LOOPBACK = "127.0.0.1"
 
 @click.command()
 @click.argument("recording", metavar="[FILE.rrd]", type=click.Path(), required=False)
-@click.option("--web", is_flag=True, help="Serve Rerun's web viewer on this machine's loopback address and print the link.")
+@click.option("--web", is_flag=True, help="Serve the web viewer on the loopback address of this machine, and print the link.")
 def view(recording: str | None, web: bool) -> int:
-    """Open a recording in the Rerun viewer; without a name the newest one here.
+    """Open a recording in the Rerun viewer. Default: the newest one in this folder.
 
     \b
     Examples:
@@ -36,7 +36,7 @@ def show(recording: str, web: bool = False) -> int:
         web: serve the web viewer on the loopback address, and print its link.
 
     Raises:
-        InputError: there is no such file, it is no recording, or the machine has no screen.
+        InputError: the file does not exist or is not a recording, or the machine has no screen.
     """
     require_recording(recording)
     if web:
@@ -46,7 +46,7 @@ def show(recording: str, web: bool = False) -> int:
 
 
 def require_screen() -> None:
-    """Refuse a machine on which no window can open.
+    """Check that the machine has a screen.
 
     Raises:
         InputError: neither DISPLAY nor WAYLAND_DISPLAY is set on Linux.
@@ -68,10 +68,10 @@ def newest_recording() -> str:
 
 
 def require_recording(name: str) -> None:
-    """Refuse a file that is no Rerun recording.
+    """Check that a file is a Rerun recording.
 
     Raises:
-        InputError: it cannot be read, or does not begin as a recording does.
+        InputError: the file cannot be read, or does not start like a recording.
     """
     try:
         with open(name, "rb") as file:
@@ -79,7 +79,7 @@ def require_recording(name: str) -> None:
     except OSError as error:
         raise InputError(f"{name}: cannot be read: {error.strerror}") from None
     if not begins.startswith(_MAGIC):
-        raise InputError(f"{name}: is no Rerun recording; those of the other commands end in .rrd")
+        raise InputError(f"{name}: not a Rerun recording; recordings end in .rrd")
 
 
 def _serve(recording: str) -> int:
@@ -94,7 +94,7 @@ def _serve(recording: str) -> int:
 
 
 def _free_ports(count: int) -> list[int]:
-    """Ports of the loopback address that nobody listens on now."""
+    """Return unused ports of the loopback address."""
     import socket
 
     sockets = [socket.create_server((_LOOPBACK, 0)) for _ in range(count)]

@@ -403,7 +403,7 @@ def _torque_cells(joint: dict[str, Any], difference: str) -> tuple[str, ...]:
 
 
 def _above_rounding(value: float) -> float:
-    """The value, and 0 where it is nothing but rounding."""
+    """Return the value, or 0 if it is rounding only."""
     return value if abs(value) > _NOTHING else 0.0
 
 

@@ -1,1 +1,1 @@
-"""A link designed as a job: loads from moves, the design, its checks, report, pictures and files."""
+"""Link design: loads from moves, the design, its checks, report, pictures and files."""

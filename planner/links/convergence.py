@@ -1,4 +1,4 @@
-"""Convergence of a link's design and of its finite elements, as in the thesis's figures 3-14, 3-15, 3-18 and 3-20."""
+"""Convergence of a link design and its finite elements (thesis, figures 3-14, 3-15, 3-18, 3-20)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -13,33 +13,35 @@ from planner.links.design import LinkDesign, by_thesis, with_shear
 
 SLICES = (20, 50, 100, 200, 400, 600, 1000)
 STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
-"""delta-H [m]"""
+"""delta-H [m]."""
 ELEMENTS = (4, 8, 16, 32, 64, 128, 256)
 PLACES = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Where the stress is looked at, as shares of the length."""
+"""Places of the stress results, relative to the length."""
 
 PRISMATIC = "Euler-Bernoulli beam, one height an element"
 
 
 @dataclass(frozen=True, eq=False)
 class Convergence:
-    """Each study as rows of what is varied and what comes out."""
+    """Results of the convergence studies: rows with the varied number first."""
 
     slices: Array
-    """(m, 2) slices and mass [kg], by the design's own method (figure 3-14)"""
+    """(m, 2) slices and mass [kg], by the method of the design (figure 3-14)"""
     steps: Array | None
-    """(m, 2) delta-H [m] and mass [kg] of the thesis's method (figure 3-15); None where its load case is not the design's"""
+    """(m, 2) delta-H [m] and mass [kg] of the thesis's method (figure 3-15); None if the design has
+    no load case for that method"""
     stepless: float | None
-    """[kg], the exact mass under the same constraints"""
+    """Mass of the exact method under the same constraints [kg]."""
     deflections: Mapping[str, Array]
-    """(m, 2) elements and deflection [m] of each model (figure 3-20); empty for a link that telescopes"""
+    """(m, 2) elements and deflection [m] per model (figure 3-20); empty if the link telescopes"""
     stresses: Array | None
-    """(m, 1 + places) elements and von Mises stress [Pa] at PLACES, of beam elements of one height each (figure 3-18)"""
+    """(m, 1 + places) elements and von Mises stress [Pa] at PLACES, for beam elements of constant
+    height (figure 3-18); None if the link telescopes"""
 
 
-@lru_cache(maxsize=1)  # picture, report and JSON of one design share it
+@lru_cache(maxsize=1)  # shared by picture, report and JSON of one design
 def study(design: LinkDesign) -> Convergence:
-    """Run the convergence studies of a design, with slices up to its own number."""
+    """Run the convergence studies of a design, with at most its number of slices."""
     slices = [n for n in SLICES if n < design.beam.slices] + [design.beam.slices]
     case = design.cases.at([design.worst])
     solved: dict[str, list[Solution]] = {}

@@ -1,4 +1,4 @@
-"""A link's design as a job: loads from moves, the method, its verification, and the boom with the new link in it."""
+"""Link design for loads from moves, its verification, and the boom with the new link."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -48,18 +48,18 @@ from planner.progress import Track
 E = TypeVar("E", bound=StrEnum)
 
 DRIVEN_BY = {"inner": 1, "lower": 2, "outer": 1, "extension": 2}
-"""The joint whose torque a link's mass weighs on most."""
+"""Joint whose torque depends most on the mass of a link."""
 
 
 class LoadFrom(StrEnum):
-    """Where a link's loads come from."""
+    """Source of the loads of a link."""
 
     THESIS = "thesis"
     MOVES = "moves"
 
 
 class Method(StrEnum):
-    """How its heights are found."""
+    """Method that finds the heights of the plates."""
 
     THESIS = "thesis"
     EXACT = "exact"
@@ -78,45 +78,46 @@ _PLAUSIBLE = {
 
 @dataclass(frozen=True)
 class LinkTask:
-    """What is asked of a link."""
+    """Requirements on a link."""
 
     link: str = "inner"
     load: str = LoadFrom.MOVES
     method: str = Method.EXACT
     material: str = "steel"
     safety_factor: float = 2.0
-    """Yield stress over the stress limit, and buckling load over the largest end load"""
+    """Yield stress / stress limit, and smallest buckling load / largest end load."""
     deflection: float = 0.01
-    """[m]"""
+    """Largest deflection [m]."""
     slices: int = 1000
     step: float = 1e-4
-    """delta-H of the thesis's method [m]"""
+    """delta-H of the thesis's method [m]."""
     min_height: float = 0.0
     max_height: float | None = None
     max_taper: float | None = None
     thickness: float | None = None
-    """Of one plate [m]; None is the link's own"""
+    """Thickness of one plate [m]; None is that of the link."""
     own_mass: bool = True
-    """See `least_mass`"""
+    """See `least_mass`."""
     shear: bool | None = None
-    """Whether shear counts in the deflection of the exact method; None is for the loads of moves, not for the thesis's"""
+    """Whether the deflection of the exact method includes shear; None means yes for the loads of
+    moves, and no for the load of the thesis."""
     buckling: bool = True
-    """Whether the exact method holds the safety factor against buckling"""
+    """Whether the exact method has a buckling constraint."""
     largest_components: bool = False
-    """Take each component's largest at once, and not every instant"""
+    """Whether to combine the largest load components, instead of one case per instant."""
     payload_as: PayloadAs = "mass"
     links: str | None = None
-    """The TOML file of plates and fittings; None is the shipped one"""
+    """TOML file of plates and fittings; None is the shipped one."""
 
     def __post_init__(self) -> None:
         by_thesis = self.method == Method.THESIS
         pointless = {
-            "frozen moments leave out shear: ask for one of them": not self.own_mass and self.shear is True,
+            "frozen moments leave out shear: choose one of them": not self.own_mass and self.shear is True,
             "the thesis's method always freezes the moments": by_thesis and not self.own_mass,
-            "the thesis's method knows no shear; the exact method does": by_thesis and self.shear is not None,
-            "the thesis's method does not hold buckling: there is none to leave out": by_thesis and not self.buckling,
+            "the thesis's method leaves out shear; use the exact method": by_thesis and self.shear is not None,
+            "the thesis's method has no buckling constraint to leave out": by_thesis and not self.buckling,
             "the thesis's method always takes the largest components": by_thesis and self.largest_components,
-            "the thesis's load is one case: it has no largest components": self.load == LoadFrom.THESIS
+            "the thesis's load is a single case: it has no largest components": self.load == LoadFrom.THESIS
             and self.largest_components,
         }
         for reason, asked in pointless.items():
@@ -130,49 +131,51 @@ class LinkTask:
 
 @dataclass(frozen=True)
 class Check:
-    """A figure of the design by an independent model."""
+    """Deflection and stress of the design by an independent model."""
 
     model: str
     elements: int
     deflection: float
     """[m]"""
     stress: float
-    """Largest von Mises stress INSIDE the length [Pa]"""
+    """Largest von Mises stress in the range INSIDE [Pa]."""
 
 
 INSIDE = (0.1, 0.9)
-"""Shares of the length between which plate and beam are compared; beyond, a plate's stress is that of its held edge."""
+"""Range of the length, relative to it, for the comparison of plate and beam. Outside of it, the
+clamped edge determines the stress of a plate."""
 
 
 @dataclass(frozen=True)
 class StressCheck:
-    """Where the stress of all cases and stations is largest: Euler-Bernoulli elements of that case, at their nearest point."""
+    """Check of the largest stress of all cases and stations by Euler-Bernoulli elements."""
 
     x: float
-    """[m]"""
+    """Nearest point of the elements [m]."""
     elements: int
     by_elements: float
-    """[Pa]"""
+    """Stress of the elements [Pa]."""
     own: float
-    """The design's own there [Pa], forces and height between stations linear"""
+    """Stress of the design at x [Pa]; forces and height are linear between stations."""
 
 
 @dataclass(frozen=True)
 class MotorChoice:
-    """A catalogue motor at a link's joint, with the old link and the new."""
+    """Checks of a catalogue motor at the joint of a link, with the old and the new link."""
 
     motor: str
     mass: float | None
     before: Verdict
     after: Verdict
     margin_before: float | None
-    """The least of the motor's rows"""
+    """Smallest margin of the motor checks with the old link."""
     margin_after: float | None
+    """The same with the new link."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkDesign:
-    """A designed link and what it changes."""
+    """Designed link and its effect on the boom."""
 
     task: LinkTask
     link: Link
@@ -180,49 +183,51 @@ class LinkDesign:
     limits: Limits
     cases: LoadCases
     thesis_load: ThesisLoad | None
-    """The load as the thesis's method takes it; None where only single instants load the link"""
+    """Load case of the thesis's method; None if the load cases are single instants."""
     equal_constraints: tuple[float, float] | None
-    """Masses of the plates by the thesis's method and the exact one under the same constraints, the thesis's [kg]"""
+    """Masses of the plates by the thesis's and the exact method, for its constraints [kg]."""
     instants: Array | None
-    """(k, 2) motion and time [s] of each case; None for a load that is no instant"""
+    """(k, 2) motion and time [s] of each case; None if the cases are not instants."""
     found: Design | ThesisDesign
-    """Heights, masses and deflections of the plates from pin to pin, by the task's method"""
+    """Heights, masses and deflections of the plates from pin to pin, by the method of the task."""
     tapered_load: float
-    """Critical end load [N] by the eigenvalue of the tapered column"""
+    """Critical end load of the tapered column, from an eigenvalue problem [N]."""
     pressed: float
-    """Largest end load along the link [N]"""
+    """Largest compressive end load along the link [N]."""
     own_deflection: float
-    """[m] with the final beam's own mass and shear, whatever the method left out"""
+    """Deflection [m] with the final beam's mass and shear, also if the method leaves them out."""
     stress: Array
-    """(n + 1,) largest von Mises stress along the link with its own mass [Pa]"""
+    """(n + 1,) largest von Mises stress along the link, with its own mass [Pa]."""
     worst: int
-    """The load case of the largest deflection"""
+    """Index of the load case with the largest deflection."""
     checks: tuple[Check, ...]
     stress_check: StressCheck | None
-    """None of a link that telescopes"""
+    """None for a telescoping link."""
     body: Body
-    """The whole link: designed plates, cross plates, fittings"""
+    """The whole link: designed plates, cross plates and fittings."""
     before: Boom
     after: Boom
     trajectories: tuple[Trajectory, ...]
     torques: tuple[Array, Array]
-    """Of the link's joint along all motions, with the old link and the new (samples,) [Nm]"""
+    """Joint torque along all motions with the old and the new link, each (samples,) [Nm]."""
     motors: tuple[MotorChoice, ...]
     warnings: tuple[str, ...]
-    """What limits the worth of this very design."""
+    """Limits to the validity of this design."""
     notes: tuple[str, ...]
 
     @property
     def exact(self) -> Design | None:
+        """Result of the exact method; None if the thesis's method was used."""
         return self.found if isinstance(self.found, Design) else None
 
     @property
     def thesis(self) -> ThesisDesign | None:
+        """Result of the thesis's method; None if the exact method was used."""
         return self.found if isinstance(self.found, ThesisDesign) else None
 
     @property
     def heights(self) -> Array:
-        """(n + 1,) [m]"""
+        """Height of the plates at the stations, (n + 1,) [m]."""
         return self.found.heights
 
     @property
@@ -237,16 +242,17 @@ class LinkDesign:
 
     @property
     def buckling_load(self) -> float:
-        """Critical end load [N]: the thesis's formula for its method, else the tapered column's."""
+        """Critical end load [N], by the thesis's formula if its method was used."""
         return self.tapered_load if self.thesis is None else thesis_buckling(self.link, self.beam, self.heights)
 
     @property
     def joint(self) -> int:
+        """Index of the joint in DRIVEN_BY."""
         return DRIVEN_BY[self.link.name]
 
     @property
     def saved(self) -> tuple[float, float]:
-        """Least and largest share of the joint's torque saved, where it is at least a tenth of its peak."""
+        """Smallest and largest relative torque saving, over samples above a tenth of its peak."""
         before, after = self.torques
         counts = np.abs(before) >= 0.1 * np.abs(before).max()
         share = 1.0 - after[counts] / before[counts]
@@ -256,15 +262,17 @@ class LinkDesign:
 def design_link(
     boom: Boom, task: LinkTask, trajectories: Sequence[Trajectory], catalogue: Catalogue | None = None
 ) -> LinkDesign:
-    """The link that a task asks for, checked by finite elements, and back in the boom.
+    """Design a link, check it by finite elements, and put it into the boom.
 
     Args:
-        trajectories: the moves that load the link, and along which its joint's torque is compared.
-        catalogue: whose motors are tried on the link's joint; None is the shipped one.
+        boom: the boom with the old link.
+        task: the requirements on the link.
+        trajectories: motions that load the link; joint torque is compared along them.
+        catalogue: motors to check at the joint of the link; None is the shipped catalogue.
 
     Raises:
         InputError: an input is malformed, not finite or out of its range.
-        InfeasibleError: no heights keep the limits.
+        InfeasibleError: no heights respect the limits.
     """
     load, method = _one_of("load", task.load, LoadFrom), _one_of("method", task.method, Method)
     if not (np.isfinite(task.safety_factor) and task.safety_factor > 0.0):
@@ -276,7 +284,7 @@ def design_link(
     beam = link.beam(material, task.slices)
     first, last = (round(share * beam.slices) for share in link.designed)
     if first == last:
-        raise InputError(f"slices is {task.slices}: not one lies in the {link.name} link's designed part")
+        raise InputError(f"slices is {task.slices}: the designed part of the {link.name} link has none of them; use more")
     if task.min_height >= beam.length:
         raise InputError(f"minimum height is {task.min_height:g} m; it must be below the link's length, {beam.length:g} m")
     limits = Limits(
@@ -290,7 +298,7 @@ def design_link(
     instants, old_load = None, None
     if load is LoadFrom.THESIS:
         if link.name != "inner":
-            raise InputError(f"the thesis's load is of the inner link, not of the {link.name} one; take the loads of moves")
+            raise InputError(f"the thesis's load is for the inner link, not for the {link.name} link; use the loads of moves")
         cases, old_load = THESIS_LOAD.cases, THESIS_LOAD
     elif method is Method.THESIS:
         old_load = thesis_load(boom, link, trajectories, payload_as=task.payload_as)
@@ -342,13 +350,18 @@ def design_link(
 
 
 def default_moves(boom: Boom, task: LinkTask, track: Track = iter) -> list[Trajectory]:
-    """Transport to phenotyping: with every profile in its least time, or the thesis's cubic of 5 s where its load is taken.
+    """Plan the default motions, from transport to phenotyping.
+
+    They are one per profile in its shortest time, or for the load of the thesis its cubic of 5 s.
 
     Args:
-        track: iterates over the profiles, and may show how far it is.
+        boom: the boom.
+        task: the requirements on the link.
+        track: iterates over the profiles, and may show progress.
 
     Raises:
-        InputError, InfeasibleError: as `plan`.
+        InputError: as `plan`.
+        InfeasibleError: as `plan`.
     """
     if task.load == LoadFrom.THESIS:
         thesis_move = plan_motion(boom, MoveSpec.of("transport", "phenotyping", duration=5.0))
@@ -357,7 +370,11 @@ def default_moves(boom: Boom, task: LinkTask, track: Track = iter) -> list[Traje
 
 
 def thesis_buckling(link: Link, beam: Beam, heights: Array) -> float:
-    """Eq. 3.38 [N] for the designed part's smallest section, one solid rounded down to whole centimetres as in the thesis."""
+    """Return the Euler load [N] of the thesis, eq. 3.38.
+
+    It is that of the smallest section of the designed part, as one solid rounded down to whole
+    centimetres.
+    """
     first, last = (round(share * beam.slices) for share in link.designed)
     smallest = float(heights[first : last + 1].min())
     rounded = np.floor(smallest * 100.0 + 1e-9) / 100.0 or smallest
@@ -366,20 +383,20 @@ def thesis_buckling(link: Link, beam: Beam, heights: Array) -> float:
 
 
 def by_thesis(beam: Beam, load: ThesisLoad, limits: Limits, task: LinkTask) -> ThesisDesign:
-    """The thesis's design for a task.
+    """Design a link by the thesis's method.
 
     Raises:
-        InputError: a limit is given that its method does not know.
+        InputError: the method does not support a given limit.
     """
     asked = {"minimum height": limits.min_height > 0.0, "maximum height": limits.max_height, "maximum taper": limits.max_taper}
     for name, given in asked.items():
         if given:
-            raise InputError(f"the thesis's method knows no {name}; the exact method does")
+            raise InputError(f"the thesis's method has no {name}; use the exact method")
     return thesis_design(beam, load, stress_limit=limits.stress, deflection_limit=limits.deflection, step=task.step)
 
 
 def with_shear(task: LinkTask) -> bool:
-    """Whether shear counts in the deflection of a task's exact design."""
+    """Return whether the deflection of the exact design includes shear."""
     return task.load == LoadFrom.MOVES if task.shear is None else task.shear
 
 
@@ -391,9 +408,10 @@ def _equals(
     old_load: ThesisLoad | None,
     found: Design | ThesisDesign,
 ) -> tuple[float, float] | None:
-    """Masses [kg] of the thesis's method and of the exact one under the thesis's own constraints; None without such a load.
+    """Return the masses [kg] by the thesis's and the exact method under the thesis's constraints.
 
-    Both hold the stress, and the deflection with the moments of the stress-only beam; the exact heights are stepless.
+    Both limit the stress, and the deflection with the moments of the stress-only beam. The exact
+    heights have no step. Return None without a load case for the thesis's method.
     """
     if old_load is None:
         return None
@@ -418,7 +436,7 @@ def _torque(boom: Boom, trajectories: Sequence[Trajectory], joint: int, payload_
 
 
 def _checks(beam: Beam, H: Array, case: LoadCases) -> list[Check]:
-    """The worst load case by finite elements, as far as they model it."""
+    """Solve the worst load case by finite elements. A telescoping link is not modelled."""
     if case.clamp[0] > 0.0:
         return []
     solved: list[tuple[str, Solution]] = [
@@ -439,7 +457,7 @@ def _stress_check(beam: Beam, H: Array, cases: LoadCases, stresses: Array) -> St
     if cases.clamp[case] > 0.0:
         return None
     worst = cases.at([case])
-    # Towards a thin end the height changes so fast that a thousand elements are 12 % off; these are 0.1 %.
+    # Height changes fast near a thin end: 1,000 elements have an error of 12 %, these of 0.1 %.
     found = solve_beam(beam, H, worst, beam.slices * max(16_000 // beam.slices, 1))
     at = int(np.abs(found.x - beam.stations[station]).argmin())
     x = found.x[at]
@@ -459,7 +477,7 @@ def _motors(
     payload_as: PayloadAs,
     catalogue: Catalogue | None,
 ) -> list[MotorChoice]:
-    """Every motor of the catalogue on the joint's gearbox and supply, along all motions."""
+    """Check every motor of the catalogue on the gearbox and supply of the joint, on all motions."""
     drive = before.drives[joint]
     if drive is None:
         return []
@@ -485,24 +503,24 @@ def _motors(
 def _warnings(
     task: LinkTask, beam: Beam, cases: LoadCases, tapered: float, bent: float, found: Design | ThesisDesign
 ) -> list[str]:
-    """What limits the worth of this very design."""
+    """Return the limits to the validity of this design."""
     warnings = []
     if found.heights.max() > beam.length / 5.0:
         warnings.append(
             f"the plates are up to {found.heights.max():.3g} m high, more than a fifth of their {beam.length:g} m: "
-            "beam theory does not hold"
+            "beam theory is not valid"
         )
     if isinstance(found, Design) and found.gap is None:
-        warnings.append("no lower bound within a tenth of the mass is proven: a lighter link may keep these limits")
+        warnings.append("no lower bound within 10 % of the mass is proven: a lighter link may exist within these limits")
     if bent > task.deflection * (1.0 + 1e-4):
         warnings.append(
-            f"with its own mass and shear it deflects {1e3 * bent:.3f} mm, above its limit; "
-            "the exact method with --shear holds that"
+            f"with its own mass and shear the link deflects {1e3 * bent:.3f} mm, above its limit; "
+            "the exact method with --shear includes both"
         )
     required = task.safety_factor * pressed(cases)
     if required > 0.0 and tapered < required * (1.0 - 1e-5):
         warnings.append(
-            f"buckling: the tapered column holds {tapered:.0f} N, below {task.safety_factor:g} times the end load of "
+            f"buckling: the tapered column carries {tapered:.0f} N, less than {task.safety_factor:g} times the end load of "
             f"{pressed(cases):.0f} N"
         )
     return warnings
@@ -519,20 +537,20 @@ def _notes(
     notes = []
     if task.load == LoadFrom.THESIS:
         notes.append(
-            "the thesis's load, 758.1 and 859.9 N, does not follow from its own move of table 3-1: the dynamics that gives its "
-            "table 2-8 gives -440.9 to 935.8 N along the link and 85.0 to 176.0 N across it; --load moves takes those of moves"
+            "the thesis's load, 758.1 and 859.9 N, does not follow from its move of table 3-1: the dynamics that reproduce its "
+            "table 2-8 give -440.9 to 935.8 N along the link and 85.0 to 176.0 N across it; --load moves uses those of moves"
         )
     else:
         notes.append(
-            "the loads are those of the moves given; what the boom does besides, and holding elsewhere, is not in them"
+            "the loads are those of the given moves only; other moves, and holding in other positions, are not included"
         )
         least = min(float(transmission_angle(t.q).min()) for t in trajectories)
         if link.name != "extension" and least < boom.limits.transmission:
             notes.append(
-                f"the linkage comes within {np.degrees(least):.2g} deg of flat: the loads there are those of its geometry"
+                f"the linkage comes within {np.degrees(least):.2g} deg of flat, where its geometry determines the loads"
             )
     if link.fittings is None:
-        notes.append("no fittings are known of this link: its new body is that of the plates alone, without pins and bosses")
+        notes.append("the fittings of this link are unknown: its new body is that of the plates only, without pins and bosses")
     elif link.fittings_origin is not None:
         notes.append(f"fittings {link.fittings.mass:.3g} kg ({link.fittings_origin.basis}): {link.fittings_origin.source}")
     if link.origin.basis != "printed":
@@ -541,10 +559,10 @@ def _notes(
         notes.append(f"material {beam.material.name} ({beam.material.origin.basis}): {beam.material.origin.source}")
     if link.fittings is not None or link.cross_plates:
         notes.append(
-            "the plates' own mass loads the design, that of fittings and cross plates does not: 0.5 kg near the end of the "
-            "thesis's inner link adds 2 % to its deflection"
+            "the design includes the weight of the plates, but not that of fittings and cross plates: 0.5 kg near the end of "
+            "the thesis's inner link adds 2 % to its deflection"
         )
     notes.append("lateral bending and torsion, fatigue, welds, pin holes and local buckling of a plate's edge are not checked")
     if isinstance(found, ThesisDesign):
-        notes.append("the thesis's method freezes the moments of its first stage and leaves out shear")
+        notes.append("the thesis's method keeps the moments of its first stage and leaves out shear")
     return notes

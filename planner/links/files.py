@@ -1,4 +1,4 @@
-"""A designed link as files: contour for CAD, stations for beam elements, outline for the cutter, and the boom with it."""
+"""Files of a designed link: contour, stations, outline, and the boom with the link."""
 
 import csv
 from pathlib import Path
@@ -23,11 +23,14 @@ COLUMNS = (
     "moment_Nm",
     "von_mises_Pa",
 )
-"""Header of the stations' CSV; forces of the load case that bends the link most, the stress the largest of all cases."""
+"""Header of the stations. Forces are those of the load case with the largest deflection; the stress
+is the largest of all cases."""
 
 
 def write_contour(path: str | Path, design: LinkDesign) -> None:
-    """x, H/2, 0 [m], a station a line, between tabs: a curve through points for CAD; mirror it for the other edge.
+    """Write x, H/2 and 0 [m] of each station, separated by tabs, as points of a CAD curve.
+
+    Mirror the curve for the other edge.
 
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
@@ -38,7 +41,7 @@ def write_contour(path: str | Path, design: LinkDesign) -> None:
 
 
 def write_stations(path: str | Path, design: LinkDesign) -> None:
-    """The stations as CSV with the header COLUMNS, for a program of beam elements.
+    """Write the stations as CSV with the header COLUMNS, for a beam element program.
 
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
@@ -53,9 +56,10 @@ def write_stations(path: str | Path, design: LinkDesign) -> None:
 
 
 def write_outline(path: str | Path, design: LinkDesign) -> None:
-    """One plate's closed outline as DXF in millimetres, layer PLATE, with its pins' centres on layer PINS.
+    """Write the closed outline of one plate as DXF in millimetres.
 
-    The contour runs from pin to pin: bosses, holes and splines to the fittings are drawn in CAD.
+    The outline is on layer PLATE, and the centres of the pins are on layer PINS. The contour runs
+    from pin to pin; bosses, holes and transitions to the fittings are added in CAD.
 
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
@@ -77,10 +81,14 @@ def write_outline(path: str | Path, design: LinkDesign) -> None:
 
 
 def write_boom(path: str | Path, source: str | Path | None, design: LinkDesign) -> None:
-    """The boom's TOML file with the new link's mass, centre of mass and inertia; all else, comments too, as it was.
+    """Write the TOML file of the boom with mass, centre of mass and inertia of the new link.
+
+    Everything else, including comments, stays unchanged.
 
     Args:
-        source: the boom's file; None is the shipped one.
+        path: the file to write.
+        source: the file of the boom; None is the shipped one.
+        design: the design of the link.
 
     Raises:
         InputError: a file cannot be read or written; an old one is left as it was.
@@ -105,7 +113,7 @@ def write_boom(path: str | Path, source: str | Path | None, design: LinkDesign) 
 
 
 def _rounded(body: Body) -> dict[str, object]:
-    """To a milligram, a micrometre and a thousandth of a gram metre squared."""
+    """Return the body rounded to 1e-6 kg, 1e-6 m and 1e-9 kg m^2."""
     inertia = (body.inertia + body.inertia.T) / 2.0
     return {
         "mass_kg": round(body.mass, 6),
@@ -116,5 +124,5 @@ def _rounded(body: Body) -> dict[str, object]:
 
 def _origin(design: LinkDesign) -> str:
     task = design.task
-    fittings = "its fittings estimated" if design.link.fittings is not None else "without fittings, which are not known"
+    fittings = "its fittings estimated" if design.link.fittings is not None else "without fittings, which are unknown"
     return f"designed: {task.method} method, loads of {task.load}, {task.material}; {fittings}"

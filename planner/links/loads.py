@@ -1,7 +1,9 @@
-"""What moves ask of a link: the force at its end and its own acceleration at every instant, along its own axes.
+"""Loads of a link from motions: end force and acceleration of the link at every instant.
 
-x runs from the link's root to its end, y across it in the arm's plane. Accelerations are less gravity. Forces along the pins,
-the thesis's z, are left out as there: how two pins share them is statically indeterminate.
+Both are along the axes of the link: x from its root to its end, y across it in the plane of the
+arm. The acceleration of gravity is subtracted from accelerations. Forces along the pins, z in the
+thesis, are left out, as in the thesis: their distribution over two pins is statically
+indeterminate.
 """
 
 from collections.abc import Sequence
@@ -22,21 +24,24 @@ _FLAT = 1e-6
 def link_cases(
     boom: Boom, link: Link, trajectories: Sequence[Trajectory], *, payload_as: PayloadAs = "mass"
 ) -> tuple[LoadCases, Array]:
-    """Every instant of every motion as a load case of a link, and which motion and time it is of, (k, 2).
+    """Return one load case per instant of the motions, and (k, 2) its motion and time.
 
-    The inner link bears the upper link at frame 8, the lower link the outer one at frame 6, the outer link the upper one at
-    frame 7; the extension bears the tool at the wrist, and is held at its housing's mouth, `clamp` from its root.
+    The end loads come from the upper link at frame 8 for the inner link, from the outer link at
+    frame 6 for the lower link, from the upper link at frame 7 for the outer link, and from the tool
+    at the wrist for the extension. The extension is held at the mouth of its housing, `clamp` from
+    its root.
 
     Raises:
-        InputError: there is no motion, loads are not finite, or a linkage is flat; names the instant.
+        InputError: there is no motion, loads are not finite, or a linkage is flat; the message
+            names the instant.
     """
     if not trajectories:
-        raise InputError("there is no motion to take a link's loads from")
+        raise InputError("no motion is given; the loads of a link need at least one")
     for i, trajectory in enumerate(trajectories):
         flat = transmission_angle(trajectory.q) < _FLAT
         if link.name != "extension" and flat.any():
             at = trajectory.t[int(np.argmax(flat))]
-            raise InputError(f"motion {i + 1}, t = {at:g} s: the linkage is flat, where pin forces have no bound")
+            raise InputError(f"motion {i + 1}, t = {at:g} s: the linkage is flat, so pin forces are unbounded")
     parts = [_of_motion(boom, link, trajectory, payload_as) for trajectory in trajectories]
     instants = [np.stack([np.full(t.t.size, i), t.t], axis=-1) for i, t in enumerate(trajectories)]
     force, moment, acceleration, clamp = (np.concatenate(each) for each in zip(*parts, strict=True))
@@ -44,15 +49,16 @@ def link_cases(
 
 
 def largest_components(cases: LoadCases) -> LoadCases:
-    """Each component's largest size at once, even where they do not meet: the thesis's way (section 3.5).
+    """Combine the largest values of the components, which need not occur together (section 3.5).
 
-    One load case that pulls and one that presses, as far as the cases do either; own loads add to the end's.
+    The result is one case in tension and one in compression, if the cases have both. The loads of
+    the link's own mass have the same sense as the end force.
     """
     fx, fy = cases.end_force.T
     across = fy[np.abs(fy).argmax()]
     along = [float(f) for f in (fx.min(), fx.max()) if f * fx[np.abs(fx).argmax()] > 0.0 or f < 0.0 < fx.max()]
     a = cases.acceleration
-    # Linear in x: the largest at the root and a metre on bound every case's between.
+    # Linear in x: the largest values at the root and at 1 m bound every case between them.
     root, far = np.abs(a[..., 0]).max(axis=0), np.abs(a.sum(axis=-1)).max(axis=0)
     rows = []
     for force in dict.fromkeys(along):
@@ -64,13 +70,15 @@ def largest_components(cases: LoadCases) -> LoadCases:
 
 
 def thesis_load(boom: Boom, link: Link, trajectories: Sequence[Trajectory], *, payload_as: PayloadAs = "mass") -> ThesisLoad:
-    """The largest components of motions, in forces, rates and the centre's acceleration, as a load of the thesis's method.
+    """Return the load for the thesis's method: the largest components over motions.
+
+    They are those of the end force, of the rates, and of the acceleration of the centre of mass.
 
     Raises:
         InputError: as `link_cases`, or the link is not the inner or the lower one.
     """
     if link.name not in ("inner", "lower"):
-        raise InputError(f"the thesis's method is for the inner and the lower link, not for the {link.name} one")
+        raise InputError(f"the thesis's method is for the inner and the lower link, not for the {link.name} link")
     cases, _ = link_cases(boom, link, trajectories, payload_as=payload_as)
     rows = []
     for trajectory in trajectories:
@@ -97,7 +105,7 @@ def _of_motion(boom: Boom, link: Link, trajectory: Trajectory, payload_as: Paylo
     if loads.pins is None:
         raise RuntimeError("reactions were asked for")
     if link.name == "extension":
-        # On the rod at the wrist: what the tool and its payload take to move, the other way. Its beam runs against e.
+        # Reaction of tool and payload at the wrist. The beam points along -e.
         e = -e
         force = np.zeros((len(q), 3))
         for name, mass in (("end_effector", boom.bodies["end_effector"].mass), ("payload", boom.payload.mass)):
@@ -108,7 +116,7 @@ def _of_motion(boom: Boom, link: Link, trajectory: Trajectory, payload_as: Paylo
         root = body.T[:, :3, 3] - link.length * e
     else:
         pin = {"inner": -loads.pins.frame_8, "lower": -loads.pins.frame_6, "outer": -loads.pins.frame_7}[link.name]
-        # Pin forces stand in frame 4, which yaws with the arm.
+        # Pin forces are given in frame 4, which yaws with the arm.
         force = pin[:, :1] * forward + pin[:, 2:] * up
         root = body.T[:, :3, 3]
     w, w1 = body.angular_velocity, body.angular_acceleration

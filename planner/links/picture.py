@@ -1,4 +1,4 @@
-"""A link's design as a picture: contour, stress, convergence, original against designed."""
+"""Pictures of a link design."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ _BLUE, _ORANGE, _GREEN, _PURPLE = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 
 
 def write_link_picture(path: str | Path, design: LinkDesign) -> None:
-    """Writes a PNG of eight plots: contours, stress along the link, convergences, the joint's torque, and mass.
+    """Write a PNG with eight plots: contour, stress, convergence, joint torque and mass.
 
     Raises:
         InputError: the file cannot be written; an old one is left as it was.
@@ -36,7 +36,7 @@ def write_link_picture(path: str | Path, design: LinkDesign) -> None:
 
 
 def link_pictures(design: LinkDesign) -> dict[str, "Figure"]:
-    """The same in two figures, by title."""
+    """Return the same plots in two figures, by title."""
     found = {}
     for name, draw in (("Design", _draw_design), ("Convergence", _draw_convergence)):
         found[name] = _figure(11.0, 7.2)
@@ -54,7 +54,7 @@ def _figure(width: float, height: float) -> "Figure":
 
 
 def _draw_design(design: LinkDesign, panels: "Sequence[Axes]") -> None:
-    """Contour, stress, torque and mass."""
+    """Draw contour, stress, torque and mass."""
     contour, stress, torque, bars = panels
     x = design.beam.stations
     for H, name, color in ((design.heights, "design", _BLUE), (design.found.stress_heights, "stress only", _ORANGE)):
@@ -82,22 +82,22 @@ def _draw_design(design: LinkDesign, panels: "Sequence[Axes]") -> None:
 
 
 def _draw_convergence(design: LinkDesign, panels: "Sequence[Axes]") -> None:
-    """Mass by slices and by delta-H, deflection and stress by elements."""
+    """Draw mass by slices and by delta-H, deflection and stress by elements."""
     slices, steps, elements, places = panels
     found = study(design)
     slices.plot(found.slices[:, 0], found.slices[:, 1], marker="o", color=_BLUE, label="plates")
     slices.set(title="Mass by number of slices", xlabel="slices", ylabel="[kg]")
     steps.set(title="Mass by delta-H of the thesis's method", xlabel="delta-H [m]", ylabel="[kg]")
     if found.steps is None or found.stepless is None:
-        _say(steps, "not run: single instants load the link")
+        _say(steps, "not run: the load cases are single instants")
     else:
         steps.semilogx(found.steps[:, 0], found.steps[:, 1], marker="o", color=_ORANGE, label="thesis's method")
-        steps.axhline(found.stepless, color=_BLUE, label="exact, at its constraints")
+        steps.axhline(found.stepless, color=_BLUE, label="exact, same constraints")
     for (name, curve), color in zip(found.deflections.items(), (_PURPLE, _BLUE, _GREEN, _ORANGE), strict=False):
         elements.semilogx(curve[:, 0], 1e3 * curve[:, 1], marker=".", color=color, label=name)
     elements.axhline(1e3 * design.limits.deflection, color="black", linestyle="--", linewidth=1.0, label="limit")
     elements.set(title="Deflection by finite elements", xlabel="elements", ylabel="[mm]")
-    places.set(title="Stress at places, beam elements of one height each", xlabel="elements", ylabel="[MPa]")
+    places.set(title="Stress at places, beam elements of constant height", xlabel="elements", ylabel="[MPa]")
     if found.stresses is None:
         for axes in (elements, places):
             _say(axes, "not modelled: the link telescopes")
@@ -119,6 +119,6 @@ def _say(axes: "Axes", text: str) -> None:
 
 
 def _broken_between_moves(design: LinkDesign, t: Array, values: Array) -> tuple[Array, Array]:
-    """With a gap between one motion and the next."""
+    """Return times and values with a gap between motions."""
     ends = np.cumsum([each.t.size for each in design.trajectories])[:-1]
     return np.insert(t, ends, np.nan), np.insert(values, ends, np.nan)

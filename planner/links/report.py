@@ -1,4 +1,4 @@
-"""A link's design for people and as JSON."""
+"""Link design as text, Markdown and JSON."""
 
 from dataclasses import asdict
 from typing import Any
@@ -13,7 +13,7 @@ from planner.reports.report import assumptions
 
 
 def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:
-    """The JSON object of `boom link`, in SI."""
+    """Return the JSON object of `boom link`, in SI."""
     exact = design.exact
     least, most = (None, None) if design.link.fittings is None else design.saved
     before, after = (float(np.abs(t).max()) for t in design.torques)
@@ -94,7 +94,7 @@ def to_json(design: LinkDesign, files: dict[str, str]) -> dict[str, Any]:
 
 
 def convergence_json(found: Convergence) -> dict[str, Any]:
-    """The convergence studies, in SI: rows of what is varied and what comes out."""
+    """Return the convergence studies in SI: rows with the varied number first."""
     return {
         "slices_mass_kg": found.slices.tolist(),
         "step_mass_kg": None if found.steps is None else found.steps.tolist(),
@@ -108,7 +108,7 @@ ROWS_HEADER = ("quantity", "stress only", "design", "limit")
 
 
 def rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
-    """The design in a few lines for people, under ROWS_HEADER."""
+    """Return the main figures of the design, under ROWS_HEADER."""
     limits, exact = design.limits, design.exact
     top = "-" if limits.max_height is None else f"{1e3 * limits.max_height:.4g} mm"
     factor = "-" if limits.buckling_factor is None else f"{limits.buckling_factor * max(design.pressed, 0.0):.0f} N"
@@ -148,7 +148,7 @@ def rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
         found.append(("lower bound of the mass", "-", gap, "-"))
     if design.equal_constraints is not None:
         theirs, ours = design.equal_constraints
-        found.append(("plates at the thesis's constraints", "-", f"{theirs:.4f} kg thesis, {ours:.4f} kg exact", "-"))
+        found.append(("plates with the thesis's constraints", "-", f"{theirs:.4f} kg thesis, {ours:.4f} kg exact", "-"))
     within = "stress at {:.0f} to {:.0f} % of the length".format(*(100.0 * share for share in INSIDE))
     found += [
         (
@@ -164,7 +164,7 @@ def rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
             (
                 f"check: Euler-Bernoulli beam, {s.elements} elements; where the stress is largest, x = {s.x:.4g} m",
                 "-",
-                f"{1e-6 * s.by_elements:.1f} MPa, by the design {1e-6 * s.own:.1f} MPa",
+                f"{1e-6 * s.by_elements:.1f} MPa, design {1e-6 * s.own:.1f} MPa",
                 f"{1e-6 * limits.stress:.4g} MPa",
             )
         )
@@ -172,7 +172,7 @@ def rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
 
 
 def sentences(design: LinkDesign) -> list[str]:
-    """What the new link changes in the boom."""
+    """Return sentences about the effect of the new link on the boom."""
     old, new = design.before.bodies[design.link.name].mass, design.body.mass
     before, after = (float(np.abs(t).max()) for t in design.torques)
     known = design.link.fittings
@@ -181,7 +181,7 @@ def sentences(design: LinkDesign) -> list[str]:
         f"{'not included' if known is None else f'of {known.mass:.3f} kg included'}",
         f"{JOINTS[design.joint]} torque, largest: {before:.1f} Nm before, {after:.1f} Nm now; {_saving(*design.saved)}"
         if known is not None
-        else f"{JOINTS[design.joint]} torque, largest: {before:.1f} Nm before; without the fittings' mass no saving is known",
+        else f"{JOINTS[design.joint]} torque, largest: {before:.1f} Nm before; saving unknown without the fittings' mass",
     ]
 
 
@@ -197,7 +197,7 @@ MOTORS_HEADER = ("motor", "mass", "before", "margin", "now", "margin")
 
 
 def motor_rows(design: LinkDesign) -> list[tuple[str, ...]]:
-    """Every motor of the catalogue at the link's joint, under MOTORS_HEADER."""
+    """Return a row per motor of the catalogue at the joint of the link, under MOTORS_HEADER."""
 
     def percent(margin: float | None) -> str:
         return "-" if margin is None else f"{margin:.0%}"
@@ -216,7 +216,7 @@ def motor_rows(design: LinkDesign) -> list[tuple[str, ...]]:
 
 
 def to_markdown(design: LinkDesign) -> str:
-    """The report as Markdown."""
+    """Return the report as Markdown."""
     lines = [f"# {title(design)}", "", *(f"- {text}" for text in sentences(design)), ""]
     for header, body in ((ROWS_HEADER, rows(design)), (MOTORS_HEADER, motor_rows(design))):
         if body:
@@ -226,6 +226,6 @@ def to_markdown(design: LinkDesign) -> str:
 
 
 def title(design: LinkDesign) -> str:
-    """What was designed, how, and for which loads."""
+    """Return the title: boom, link, method, loads and material."""
     task = design.task
     return f"{design.before.name}: {design.link.name} link, {task.method} method, loads of {task.load}, {task.material}"

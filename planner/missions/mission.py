@@ -28,7 +28,7 @@ from planner.motion.trajectory import STEP, Trajectory
 from planner.motion.vehicle import LEVEL, VehicleCase
 from planner.move_spec import MoveWords
 from planner.paths.targets import Target, TipTarget, parse_pitch, parse_target, resolve
-from planner.planning import check, plan_motion
+from planner.planning import Move, check_motion, plan_motion
 from planner.progress import Track
 from planner.reports.report import Report
 from planner.timing.profile import JerkLimited
@@ -289,12 +289,24 @@ def check_cycle(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", veh
     Raises:
         InputError: the vehicle moves.
     """
+    return cycle_move(boom, cycle, payload_as=payload_as, vehicle=vehicle).report
+
+
+def cycle_move(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", vehicle: VehicleCase = LEVEL) -> Move:
+    """Return a cycle as one move, for a recording: each distinct leg at its first occurrence.
+
+    Its report is that of `check_cycle`.
+
+    Raises:
+        InputError: the vehicle moves.
+    """
     check_steady(vehicle)
-    report = check(
-        boom, cycle.trajectory, payload_as=payload_as, vehicle=vehicle, profile=f"mission {cycle.mission.name}", duty=cycle.duty
+    name = f"mission {cycle.mission.name}"
+    move = check_motion(boom, cycle.trajectory, payload_as=payload_as, vehicle=vehicle, profile=name, duty=cycle.duty)
+    notes = (*leg_sentences(cycle), *move.report.notes)
+    return replace(
+        move, report=replace(move.report, notes=notes, assumptions=(*cycle.mission.assumptions, *move.report.assumptions))
     )
-    stated = cycle.mission.assumptions
-    return replace(report, notes=(*leg_sentences(cycle), *report.notes), assumptions=(*stated, *report.assumptions))
 
 
 def leg_sentences(cycle: Cycle) -> tuple[str, ...]:

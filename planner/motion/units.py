@@ -75,7 +75,7 @@ def _require_rate(path: str | Path, t: Array, value: tuple[str, Array, str], rat
 
 
 def _factor(moved: Array, summed: Array) -> float | None:
-    """The factor between what moved and the sum of its rate; None unless the one is much like the other."""
+    """Return the ratio of a change to the integral of its rate; None unless they are similar."""
     both, own, other = (float((a * b).sum()) for a, b in ((moved, summed), (moved, moved), (summed, summed)))
     if own <= 0.0 or other <= 0.0 or both < _ALIKE * np.sqrt(own) * np.sqrt(other):
         return None

@@ -1,4 +1,4 @@
-"""The answer about a motion in some fifteen lines: the verdict in words, a line for each joint, and what to look at.
+"""Summary of a report: the verdict, a line for each joint, and the findings.
 
 Terminal, recording, report and notebook show the same lines.
 """
@@ -13,13 +13,13 @@ from planner.checks.rows import Row, Verdict
 from planner.reports.report import Report, cells
 
 JOINT_HEADER = ("joint", "load", "tightest limit", "used", "at", "gearbox", "motor", "verdict")
-"""Columns of `joint_table`. *Used* is the largest demand, with its required margin, divided by the limit; so are the columns
-of the gearbox and the motor."""
+"""Columns of `joint_table`. *Used*, gearbox and motor are the demand, with its required
+margin, divided by the limit."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a motion's report says first."""
+    """Summary of a report."""
 
     verdict: Verdict
     sentence: str
@@ -31,11 +31,11 @@ class Answer:
     findings: tuple[str, ...]
     """Checks that FAIL or WARN, worst first, with their numbers."""
     assumed: int
-    """How many assumed figures enter."""
+    """Number of assumed figures."""
 
 
 def answer(report: Report) -> Answer:
-    """Return the first lines of a report."""
+    """Return the summary of a report."""
     failed = _failed(report)
     return Answer(
         verdict=report.verdict,
@@ -48,10 +48,10 @@ def answer(report: Report) -> Answer:
 
 
 def usage(row: Row) -> float | None:
-    """Return demand (1 + required margin) / limit, the share of a limit that is used; 1 is just allowed.
+    """Return the used share of a limit, demand (1 + required margin) / limit.
 
-    None of a guideline, of a distance to a bound, of a row without a limit, and of a brake: it carries what the gearbox
-    cannot, and its strength is not known.
+    A share of 1 is just allowed. Return None for a guideline, a distance to a bound, a row without
+    a limit, and a brake, which carries what the gearbox cannot and has an unknown strength.
     """
     if row.kind.severity is not Severity.LIMIT or row.kind.margin is not Margin.RATIO or row.kind.part is Part.BRAKE:
         return None
@@ -85,7 +85,7 @@ def joint_table(report: Report) -> tuple[tuple[str, ...], ...]:
 
 
 def _headline(rows: Sequence[Row]) -> str:
-    """The largest moment on the mount, or what the drives move the tip."""
+    """Return the largest moment on the mount, or the largest tip deflection from the drives."""
     wanted = ("peak moment", "deflection in all")
     return next((cells(row)[2] for row in rows if row.check in wanted and row.demand is not None), "-")
 
@@ -130,7 +130,7 @@ def _open(report: Report) -> list[str]:
 
 
 def _findings(report: Report) -> Iterable[str]:
-    """A line for each check that FAILs or WARNs, with the numbers of every joint."""
+    """Yield a line for each check that FAILs or WARNs, with the numbers of every joint."""
     for verdict in (Verdict.FAIL, Verdict.WARN):
         rows = sorted((row for row in report.rows if row.verdict is verdict), key=lambda row: row.check)
         for check, same in groupby(rows, key=lambda row: row.check):
@@ -139,9 +139,10 @@ def _findings(report: Report) -> Iterable[str]:
 
 
 def _numbers(row: Row) -> str:
-    """The demand and its limit, in people's units."""
+    """Return demand and limit with their units."""
     demand, limit = cells(row)[2:4]
-    return demand if limit == "-" else f"{demand} of {limit}"
+    margin = f" and {row.required_margin:.0%}" if row.required_margin > 0.0 else ""
+    return demand if limit == "-" else f"{demand}{margin} of {limit}"
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -28,12 +28,17 @@ FORMS = (".md", ".html", ".pdf")
 _TEXT = 8  # [pt]
 _PADDING = 0.6  # [mm]
 _WITH_HEADING = 25.0  # [mm], least space below a heading on its page
+_LEAST_PICTURE = 50.0  # [mm], least height left for the picture of the first page
+_FIRST = "The move"
+_VERDICTS = {"FAIL": "#b00020", "WARN": "#a15c00", "INCOMPLETE": "#7a3b8f", "PASS": "#00663d"}
+_Lead = tuple[str, bytes] | None
+"""Markdown and picture of a first page."""
 _LIBRARIES = ("numpy", "scipy", "toppra", "ruckig", "control")
 _STYLE = (
     "body{font-family:sans-serif;max-width:75em;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;font-size:.85em}td,th{border:1px solid #bbb;padding:.25em .5em;text-align:left}"
     "th{background:#eee}img{max-width:100%}code{background:#f3f3f3}"
-)
+) + "".join(f".{verdict}{{color:{color}}}" for verdict, color in _VERDICTS.items())
 
 
 def require_form(path: str) -> None:
@@ -59,7 +64,9 @@ def command_line() -> str:
 
 
 def without_pictures(markdown: str) -> str:
-    r"""Return Markdown whose own pictures and tags are plain text: a TOML source could have them loaded from anywhere.
+    r"""Return Markdown with its pictures and tags as plain text.
+
+    Text from a TOML file could otherwise load pictures from any address.
 
     >>> print(without_pictures("![x](http://a/b.png) <img src=c> 1 < 2"))
     !\[x](http://a/b.png) \<img src=c> 1 < 2
@@ -67,8 +74,16 @@ def without_pictures(markdown: str) -> str:
     return re.sub(r"<(?=[A-Za-z/!?])", r"\\<", markdown.replace("![", r"!\["))
 
 
-def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figure"]) -> None:
+def write_document(
+    path: str | Path, markdown: str, pictures: Mapping[str, "Figure"], first: tuple[str, "Figure"] | None = None
+) -> None:
     """Write a report with its pictures by title, the command line and the library versions.
+
+    Args:
+        path: the file.
+        markdown: the report.
+        pictures: by title, set after the report.
+        first: Markdown and picture of a first page, if there is one.
 
     HTML and PDF files contain their pictures. A Markdown file refers to pictures beside it, named
     FILE-1.png, FILE-2.png and so on.
@@ -80,20 +95,23 @@ def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figu
     require_form(str(path))
     path, markdown = Path(path), without_pictures(markdown)
     drawn = {title: _png(figure) for title, figure in pictures.items()}
+    lead = None if first is None else (without_pictures(first[0]), _png(first[1]))
     made = f"Made by `{command_line()}` with {', '.join(_versions())}, Python {sys.version.split()[0]}."
     with replacing(path) as temporary:
         place = Path(temporary)
         if path.suffix == ".md":
-            content = f"{markdown.rstrip()}\n"
-            for k, (title, png) in enumerate(drawn.items(), start=1):
-                beside = place.with_name(f"{path.stem}-{k}.png")  # moves along
-                _write(beside, png)
-                content += f"\n## {title}\n\n![{title}]({beside.name})\n"
+            shown = drawn if lead is None else {_FIRST: lead[1]} | drawn
+            names = {title: f"{path.stem}-{k}.png" for k, title in enumerate(shown, start=1)}
+            for title, png in shown.items():
+                _write(place.with_name(names[title]), png)  # moves along
+            content = "" if lead is None else f"{lead[0].rstrip()}\n\n![{_FIRST}]({names[_FIRST]})\n\n"
+            content += f"{markdown.strip()}\n"
+            content += "".join(f"\n## {title}\n\n![{title}]({names[title]})\n" for title in drawn)
             _write(place, _encoded(f"{content}\n---\n\n{made}\n"))
         elif path.suffix == ".html":
-            _write(place, _encoded(_html(path.stem, markdown, drawn, made)))
+            _write(place, _encoded(_html(path.stem, markdown, drawn, made, lead)))
         else:
-            _write(place, _pdf(markdown, drawn, made))
+            _write(place, _pdf(markdown, drawn, made, lead))
 
 
 def _write(place: Path, data: bytes) -> None:
@@ -113,29 +131,50 @@ def _versions() -> list[str]:
         return found
 
 
-def _html(title: str, markdown: str, drawn: Mapping[str, bytes], made: str) -> str:
+def _html(title: str, markdown: str, drawn: Mapping[str, bytes], made: str, lead: _Lead = None) -> str:
     from markdown_it import MarkdownIt
 
     render = MarkdownIt("commonmark", {"html": False}).enable("table").render
     head = f'<meta charset="utf-8"><title>{escape(title)}</title><style>{_STYLE}</style>'
-    pictures = "".join(
-        f'<h2>{escape(name)}</h2>\n<img alt="{escape(name)}" src="data:image/png;base64,{b64encode(png).decode()}">\n'
-        for name, png in drawn.items()
-    )
-    body = f"{render(markdown)}{pictures}<hr>\n{render(made)}"
+
+    def picture(name: str, png: bytes) -> str:
+        return f'<img alt="{escape(name)}" src="data:image/png;base64,{b64encode(png).decode()}">\n'
+
+    begins = "" if lead is None else render(lead[0]) + picture(_FIRST, lead[1])
+    begins = re.sub(rf"<strong>({'|'.join(_VERDICTS)})", r'<strong class="\1">\1', begins)
+    pictures = "".join(f"<h2>{escape(name)}</h2>\n{picture(name, png)}" for name, png in drawn.items())
+    body = f"{begins}{render(markdown)}{pictures}<hr>\n{render(made)}"
     return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body>\n{body}</body></html>\n'
 
 
-def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str) -> bytes:
-    """Return a PDF: headings, paragraphs, lists and tables, then a page for each picture."""
+def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str, lead: _Lead = None) -> bytes:
+    """Return a PDF: a first page, headings, paragraphs, lists and tables, then a page for each picture."""
     from fpdf import FPDF
-    from markdown_it import MarkdownIt
-    from markdown_it.tree import SyntaxTreeNode
 
     pdf = FPDF(orientation="landscape", format="A4")
     pdf.set_font("helvetica", size=_TEXT)
     pdf.add_page()
-    for node in SyntaxTreeNode(MarkdownIt("commonmark").enable("table").parse(f"{markdown}\n\n{made}\n")).children:
+    if lead is not None:
+        _set_markdown(pdf, lead[0])
+        if pdf.eph + pdf.t_margin - pdf.y < _LEAST_PICTURE:
+            pdf.add_page()
+        pdf.image(io.BytesIO(lead[1]), w=pdf.epw, h=pdf.eph + pdf.t_margin - pdf.y - 2.0, keep_aspect_ratio=True)
+        pdf.add_page()
+    _set_markdown(pdf, f"{markdown}\n\n{made}\n")
+    for title, png in drawn.items():
+        pdf.add_page()
+        pdf.set_font("helvetica", "B", _TEXT + 3)
+        pdf.cell(0, 8, title, new_x="LMARGIN", new_y="NEXT")
+        pdf.image(io.BytesIO(png), w=pdf.epw, h=pdf.eph - 10, keep_aspect_ratio=True)
+    return bytes(pdf.output())
+
+
+def _set_markdown(pdf: "FPDF", markdown: str) -> None:
+    """Set headings, paragraphs, lists and tables; a paragraph that begins with a verdict has its colour."""
+    from markdown_it import MarkdownIt
+    from markdown_it.tree import SyntaxTreeNode
+
+    for node in SyntaxTreeNode(MarkdownIt("commonmark").enable("table").parse(markdown)).children:
         if node.type == "table":
             pdf.ln(2)
             _set_table(pdf, [[_text(cell) for cell in row.children] for part in node.children for row in part.children])
@@ -150,15 +189,11 @@ def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str) -> bytes:
             pdf.ln(1)
         else:
             pdf.ln(1)
+            pdf.set_text_color(_VERDICTS.get(_text(node).partition(":")[0], "#000000"))
             for line in node.children if node.type == "bullet_list" else [node]:
                 pdf.multi_cell(0, _TEXT / 2, ("- " if node.type == "bullet_list" else "") + _text(line), align="L",
                                new_x="LMARGIN", new_y="NEXT")  # fmt: skip
-    for title, png in drawn.items():
-        pdf.add_page()
-        pdf.set_font("helvetica", "B", _TEXT + 3)
-        pdf.cell(0, 8, title, new_x="LMARGIN", new_y="NEXT")
-        pdf.image(io.BytesIO(png), w=pdf.epw, h=pdf.eph - 10, keep_aspect_ratio=True)
-    return bytes(pdf.output())
+            pdf.set_text_color("#000000")
 
 
 def _set_table(pdf: "FPDF", rows: list[list[str]]) -> None:

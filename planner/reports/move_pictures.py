@@ -28,7 +28,7 @@ def move_pictures(boom: Boom, motion: Trajectory, tau: Array) -> dict[str, "Figu
 
 
 def move_figure(boom: Boom, motion: Trajectory, tau: Array) -> "Figure":
-    """One figure of positions, velocities and torques (n, 5), a column for each joint, with their limits."""
+    """Draw positions, velocities and torques (n, 5) with their limits, one column per joint."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -144,17 +144,20 @@ class Report:
 
     def to_markdown(self) -> str:
         """Return the report as Markdown, in displayed units."""
+        return f"# {self.summary}\n\n{self.profile}, {self.duration:.3f} s\n{self.details()}"
+
+    def details(self) -> str:
+        """Return all but the title: peaks, certificate and notes, then every check and assumption."""
         header = ("joint", "check", "demand", "limit", "margin", "required", "at", "verdict", "basis", "source")
-        lines = [f"# {self.summary}", "", f"{self.profile}, {self.duration:.3f} s", ""]
-        lines += table(header, [(*cells(row), row.source) for row in self.rows])
+        lines = []
         if self.peaks:
             lines += ["", "## Largest torques and where they come from", "", *table(PEAK_HEADER, map(peak_cells, self.peaks))]
         if self.certificate is not None:
             lines += ["", "## Certificate", "", *table(CERTIFICATE_HEADER, map(worst_cells, self.certificate.worst))]
         lines += [f"\n{sentence}" for sentence in self.sentences]
-        for title, texts in (("Possible fixes", self.suggestions), ("Notes", self.notes), ("Assumed", self.assumptions)):
-            lines += section(title, texts)
-        return "\n".join(lines) + "\n"
+        lines += [*section("Possible fixes", self.suggestions), *section("Notes", self.notes)]
+        lines += ["", "## Every check", "", *table(header, [(*cells(row), row.source) for row in self.rows])]
+        return "\n".join([*lines, *section("Assumed", self.assumptions)]) + "\n"
 
 
 def cells(row: Row) -> tuple[str, ...]:

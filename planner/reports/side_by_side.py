@@ -71,7 +71,7 @@ def _pair(row: Row | None) -> tuple[str, str]:
 
 
 def loads_side_by_side(reports: Mapping[str, Report]) -> list[tuple[str, ...]]:
-    """Return a row for each joint: of each report the largest load, the share of its tightest limit, and the verdict."""
+    """Return a row per joint: largest load, used share of the tightest limit, verdict per report."""
     tables = [{row[0]: row for row in joint_table(report)} for report in reports.values()]
     rows = []
     for joint in dict.fromkeys(name for each in tables for name in each):

@@ -1,0 +1,1 @@
+"""Timing of paths: profiles, time laws, and their limits."""

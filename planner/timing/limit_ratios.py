@@ -1,4 +1,4 @@
-"""States of a motion over every limit that it must keep."""
+"""Ratios of the states of a motion to the limits of joints and drives."""
 
 from enum import StrEnum
 
@@ -10,11 +10,11 @@ from boom_model.drives.drive import available_torque, motor_limit
 from planner.timing.path_limits import gear_ratio, motor_ratio
 
 RATIO_TOLERANCE = 1e-3
-"""How far above 1 a ratio may be: what a planner may miss between the points that it looks at."""
+"""Tolerance above 1 of a ratio, because a planner tests the limits at grid points only."""
 
 
 class Limit(StrEnum):
-    """A limit of the joints or of their drives."""
+    """Limit of the joints or of their drives."""
 
     POSITION = "position"
     LINKAGE = "lower - inner"
@@ -24,21 +24,25 @@ class Limit(StrEnum):
     GEARBOX_TORQUE = "gearbox torque"
     MOTOR_TORQUE = "motor torque"
     STANDSTILL_TORQUE = "motor torque at standstill"
-    """Stands for MOTOR_TORQUE where a motor's supply is not given."""
+    """Replaces MOTOR_TORQUE if the supply of a motor is unknown."""
     AVERAGE_TORQUE = "average torque"
 
 
 def rate_ratios(boom: Boom, qd: Array, qdd: Array, qddd: Array | None) -> dict[Limit, Array]:
-    """Velocities, accelerations and, where they are given, jerks (n, 5) over the joints' limits."""
+    """Return the ratios of joint velocities, accelerations and jerks (n, 5) to their limits.
+
+    Jerks are left out if they are None.
+    """
     limits = boom.limits
     ratios = {Limit.VELOCITY: np.abs(qd) / limits.velocity, Limit.ACCELERATION: np.abs(qdd) / limits.acceleration}
     return ratios if qddd is None else ratios | {Limit.JERK: np.abs(qddd) / limits.jerk}
 
 
 def limit_ratios(boom: Boom, q: Array, qd: Array, qdd: Array, qddd: Array | None, tau: Array) -> dict[Limit, Array]:
-    """Each limit with the ratios (n, 5) of states and torques (n, 5) to it; drive limits that no drive gives are left out.
+    """Return the ratios (n, 5) of states and torques (n, 5) to each limit.
 
-    A position's ratio is its distance from the middle of the range over half the range; the linkage's is limit / angle.
+    The ratio of a position is its distance from the middle of the range divided by half the range.
+    The ratio of the linkage is limit / angle. Drive limits that no drive has are left out.
     """
     limits = boom.limits
     half, middle = (limits.upper - limits.lower) / 2.0, (limits.upper + limits.lower) / 2.0

@@ -1,11 +1,12 @@
-"""The limits of the joints and of their drives along a path, as conditions on its speed and acceleration.
+"""Joint and drive limits along a path, as conditions on the speed and acceleration of the path.
 
-On a path p(s), with u = s'' and x = s'^2, joint velocities are p' s', accelerations p' u + p'' x and torques
+On a path p(s), with u = s'' and x = s'^2, the joint velocities are p' s', the joint accelerations
+p' u + p'' x, and the joint torques without friction
 
-    a u + b x + c,   c = tau(p, 0, 0),   a = tau(p, 0, p') - c,   b = tau(p, p', p'') - c,
+    a u + b x + c,   c = tau(p, 0, 0),   a = tau(p, 0, p') - c,   b = tau(p, p', p'') - c.
 
-to which friction adds. The gearbox bears this torque; the motor accelerates its own inertia besides, and its limit falls with
-its speed, that is with x.
+The gearbox transmits this torque plus friction. The motor also accelerates its own inertia, and its
+limit decreases with its speed, and so with x.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -35,16 +36,17 @@ _LOOKS, _CURVED_LOOKS = 2001, 10_001
 
 
 class InfeasiblePathError(InfeasibleError):
-    """A path that no time law can travel within the limits: the drive that fails, where, and by how much."""
+    """No time law travels a path within the limits; names drive, place, demand and limit."""
 
     def __init__(self, message: str, joint: str, s: float, demand: float, limit: float) -> None:
+        """Keep the joint, the place s on the path, the demand and the limit [Nm]."""
         super().__init__(message)
         self.joint, self.s, self.demand, self.limit = joint, s, demand, limit
 
 
 @dataclass(frozen=True, eq=False)
 class PathDynamics:
-    """What a path asks of the joints at points s (n,)."""
+    """Terms of the joint torques at points s (n,) of a path."""
 
     boom: Boom
     path: Path
@@ -65,23 +67,24 @@ class PathDynamics:
     """(n, 5) viscous friction per s'"""
     base: BaseMotion | None
     cap: Array
-    """(n,) a bound on x besides the joint velocities'"""
+    """(n,) bound on x, in addition to that from the joint velocities"""
 
     def at(self, points: Array) -> "PathDynamics":
-        """The same at some of the points, by their numbers."""
+        """Return the terms at the points with these indices."""
         names = ("s", "p1", "p2", "a", "b", "c", "coulomb", "viscous", "cap")
         return replace(self, **{name: getattr(self, name)[points] for name in names})
 
     @property
     def x_max(self) -> Array:
-        """(n,) the largest x that the joint velocities and the cap allow."""
+        """(n,) largest x that the velocity limits and the cap allow."""
         return np.minimum(_largest_x(self.boom, self.p1), self.cap)
 
     def friction_tangent(self, x: Array) -> tuple[Array, Array]:
-        """(n, 5) twice: intercept and slope over x of a line that friction, coulomb + viscous sqrt(x), never exceeds.
+        """Return intercept and slope over x, each (n, 5), of a line above joint friction.
 
-        Its tangent at x (n,); at the ends, where x is 0, that of the point beside them, and without any x that at the largest
-        one that the joint velocities allow.
+        Friction is coulomb + viscous sqrt(x), and the line is its tangent at x (n,). The two ends
+        use the x of the point next to them. Where that is 0, the largest x that the velocity limits
+        allow replaces it.
         """
         largest = np.minimum(self.x_max, _FINITE)
         x = np.concatenate([x[1:2], x[1:-1], x[-2:-1]])
@@ -91,36 +94,50 @@ class PathDynamics:
 
     @property
     def static_ratio(self) -> Array:
-        """(n, 5) of merely holding the load, over what motor and gearbox allow at rest."""
+        """(n, 5) static torque divided by the limit of motor and gearbox at rest."""
         held: Array = np.abs(self.c) / static_limits(self.boom)
         return held
 
 
 def gear_ratio(boom: Boom, tau: Array) -> Array:
-    """Joint torques (..., 5) over the gearboxes' start-stop torque; 0 where none is given."""
+    """Return the ratio of joint torques (..., 5) to the start-stop torque of the gearboxes.
+
+    The ratio is 0 where that torque is unknown.
+    """
     ratio: Array = np.abs(tau) / gear_limits(boom)
     return ratio
 
 
 def motor_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array) -> Array:
-    """Joint torques (..., 5) and what the drives' own inertia adds, over `motor_limits` at that speed; 0 where none is."""
+    """Return the ratio (..., 5) of motor torque to `motor_limits` at the motor's speed.
+
+    Motor torque is joint torque plus the torque that accelerates the inertia of the drive, both at
+    the joint. The ratio is 0 for a joint without a motor limit.
+    """
     limits = motor_limits(boom, qd)
     driven = np.abs(tau + rotors(boom) * qdd)
     return np.divide(driven, limits, out=np.full_like(driven, np.inf), where=limits > 0.0)
 
 
 def load_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array) -> Array:
-    """(..., 5) the larger of gearbox and motor torque over their limits."""
+    """Return the larger of `gear_ratio` and `motor_ratio`, (..., 5)."""
     return np.maximum(gear_ratio(boom, tau), motor_ratio(boom, tau, qd, qdd))
 
 
 def limited_by_drives(boom: Boom) -> bool:
-    """Whether any gearbox or motor limits a torque."""
+    """Return whether any gearbox or motor has a torque limit."""
     return bool(np.isfinite(static_limits(boom)).any())
 
 
 def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = None) -> PathDynamics:
-    """The path's demands at s (n,) on a base that is tilted at most, with all the dynamics in one batch."""
+    """Return the torque terms of a path at s (n,), from one batch of inverse dynamics.
+
+    Args:
+        boom: the boom.
+        path: the path.
+        s: places on the path, (n,).
+        base: tilt of the base, which must not move; None is level.
+    """
     p, p1, p2 = (path(s, order) for order in range(3))
     zero = np.zeros_like(p)
     states = [p, p, p], [zero, zero, p1], [zero, p1, p2]
@@ -137,7 +154,10 @@ def _largest_x(boom: Boom, p1: Array) -> Array:
 
 
 def demand_ratios(boom: Boom, path: Path, law: TimeLaw, t: Array, base: BaseMotion | None = None) -> tuple[Array, Array]:
-    """(n,) twice: the largest ratio to a joint's acceleration limit, and to a drive's, at times t (n,) of a law."""
+    """Return the largest ratios, each (n,), to acceleration limits and to drive limits.
+
+    They are those of a law at times t (n,).
+    """
     s, v, u = (np.asarray(law.s(t, order))[:, None] for order in range(3))
     q, p1, p2 = (path(np.clip(s[:, 0], 0.0, 1.0), order) for order in range(3))
     qd, qdd = p1 * v, p1 * u + p2 * v**2
@@ -147,11 +167,12 @@ def demand_ratios(boom: Boom, path: Path, law: TimeLaw, t: Array, base: BaseMoti
 
 
 def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None, samples: int = _LOOKS) -> float:
-    """The factor by which a law must be slowed (or may be hastened, below 1) to keep the limits along its path.
+    """Return the smallest factor on the duration of a law with which it respects the limits.
 
-    Slowed by k, velocities fall as 1/k and accelerations as 1/k^2: the joint limits give k at once. What the drives ask for
-    besides is a root above it. Where a drive cannot even hold the load somewhere no slowness mends the move, and the joint
-    limits alone decide.
+    A factor below 1 means that the law can be faster. A law slowed by k has 1/k of the velocities
+    and 1/k^2 of the accelerations, so k for the joint limits is explicit. The drive limits may need
+    a larger k, which is found as a root. If a drive cannot even hold the static load somewhere,
+    slowing does not help, and the result is k for the joint limits.
     """
     t = Motion(path, law).times(samples)
     s, v, u = (np.asarray(law.s(t, order))[:, None] for order in range(3))
@@ -171,19 +192,20 @@ def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None 
 
 @dataclass(frozen=True, eq=False)
 class PathLoads:
-    """A path's torques a u + b x + c, interpolated along it: for a search that asks for them many times.
+    """Torques a u + b x + c of a path, interpolated along it for a search that needs them often.
 
-    Linearly: beside a waypoint they can jump, and anything smoother overshoots there.
+    The interpolation is linear, because the terms can jump at a waypoint, where a smoother
+    interpolant overshoots.
     """
 
     boom: Boom
     path: Path
     torques: "BSpline"
-    """s to (3, 5): a, b and c"""
+    """function of s with values (3, 5): a, b and c"""
 
     @staticmethod
     def along(boom: Boom, path: Path, base: BaseMotion | None = None) -> "PathLoads":
-        """The loads of a path on a base that is tilted at most."""
+        """Return the loads of a path. `base` may be tilted, but must not move."""
         from scipy.interpolate import make_interp_spline
 
         s = spread(path, _LOAD_INTERVALS)
@@ -191,7 +213,7 @@ class PathLoads:
         return PathLoads(boom, path, make_interp_spline(s, np.stack([demands.a, demands.b, demands.c], axis=1), k=1))
 
     def stretch(self, law: TimeLaw, t: Array, floor: float) -> float:
-        """The least factor from `floor` on by which a law must be slowed to keep the limits at times t (n,)."""
+        """Return the smallest factor >= `floor` with which a law respects the limits at t (n,)."""
         s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
         s, v, u = np.clip(s, 0.0, 1.0), v[:, None], u[:, None]
         p1 = self.path(s, 1)
@@ -210,13 +232,16 @@ def _joint_stretch(boom: Boom, qd: Array, qdd: Array) -> float:
 
 
 def _drive_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array, rubbing: Array) -> Array:
-    """(n, 5) the larger of gearbox and motor torque over their limits, without friction and with it.
+    """Return the largest drive ratio (n, 5) of `load_ratio`, without friction and with it.
 
-    Friction earns no credit while braking.
+    Both count, so that friction is no help while braking.
 
     Args:
-        tau: (n, 5) torques without friction.
-        rubbing: (n, 5) Coulomb friction.
+        boom: the boom.
+        tau: torques without friction, (n, 5).
+        qd: joint velocities, (n, 5).
+        qdd: joint accelerations, (n, 5).
+        rubbing: Coulomb friction, (n, 5).
     """
     ratio, viscous = load_ratio(boom, tau, qd, qdd), boom.friction.viscous
     if not (rubbing.any() or viscous.any()):
@@ -225,9 +250,10 @@ def _drive_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array, rubbing: Array) 
 
 
 def _drive_stretch(boom: Boom, least: float, qd: Array, qdd: Array, static: Array, dynamic: Array, rubbing: Array) -> float:
-    """The least factor from `least` on at which torques static + dynamic / k^2, and friction, keep the drives' limits.
+    """Return the smallest factor k >= `least` with which a law respects the drive limits.
 
-    `least` itself where a drive cannot even hold the load.
+    Its torques are static + dynamic / k^2 + friction. Return `least` if a drive cannot even hold
+    the static load.
     """
     zero = np.zeros_like(qd)
     if (_drive_ratio(boom, static, zero, zero, rubbing) >= 1.0).any():
@@ -245,9 +271,9 @@ def _drive_stretch(boom: Boom, least: float, qd: Array, qdd: Array, static: Arra
 
 
 def peak_rate_ratios(boom: Boom, motion: Motion, t: Array) -> tuple[float, float, float]:
-    """The largest ratios of the joints' velocity, acceleration and jerk to their limits at times t (n,)."""
+    """Return the largest ratios of joint velocity, acceleration, jerk to their limits at t (n,)."""
     limits = boom.limits
-    if isinstance(motion.path, JointLine):  # the peaks of the law decide
+    if isinstance(motion.path, JointLine):  # the largest rates of the law decide
         peaks = (float(np.abs(motion.law.s(t, order)).max()) for order in (1, 2, 3))
         velocity, acceleration, jerk = (peak / limit for peak, limit in zip(peaks, path_limits(boom, motion.path), strict=True))
         return velocity, acceleration, jerk
@@ -260,27 +286,33 @@ def peak_rate_ratios(boom: Boom, motion: Motion, t: Array) -> tuple[float, float
 
 
 def jerk_stretch(boom: Boom, path: Path, law: TimeLaw, samples: int = 20_001) -> float:
-    """The factor by which a law must be slowed to keep the joints' jerk limits; below 1 where it may be hastened."""
+    """Return the smallest factor on the duration of a law with which it respects the jerk limits.
+
+    A factor below 1 means that the law can be faster.
+    """
     motion = Motion(path, law)
     return float(np.cbrt(peak_rate_ratios(boom, motion, motion.times(samples))[2]))
 
 
 def looks(path: Path) -> int:
-    """Points at which a planner looks at a motion along a path before it is certified."""
+    """Return the number of points at which a planner tests a motion along a path."""
     return _LOOKS if isinstance(path, JointLine) else _CURVED_LOOKS
 
 
 def spread(path: Path, intervals: int) -> Array:
-    """Places s from 0 to 1 in so many steps, and in at least `_BETWEEN` between two knots of the path, which are among them."""
+    """Return places s from 0 to 1 with steps of at most 1 / intervals.
+
+    They include the knots of the path, with at least `_BETWEEN` steps between two knots.
+    """
     edges = np.concatenate([[0.0], path.knots, [1.0]])
     steps = np.maximum(np.ceil(np.diff(edges) * intervals - _ROUNDING), _BETWEEN if len(path.knots) else 1).astype(int)
     return np.unique(np.concatenate([np.linspace(a, b, n + 1) for a, b, n in zip(edges[:-1], edges[1:], steps, strict=True)]))
 
 
 def path_limits(boom: Boom, path: Path) -> tuple[float, float, float]:
-    """The least of limit / |p'| over joints and path, for velocity, acceleration and jerk.
+    """Return the smallest limit / |p'| over joints and path, for velocity, acceleration and jerk.
 
-    On a straight path they bound the first, second and third time derivative of s.
+    On a straight path these are the limits on the first, second and third time derivative of s.
     """
     points = np.linspace(0.0, 1.0, 1 if isinstance(path, JointLine) else _SLOPES)
     step = np.abs(path(points, 1)).max(axis=0)
@@ -293,7 +325,7 @@ def path_limits(boom: Boom, path: Path) -> tuple[float, float, float]:
 
 
 def shares(boom: Boom, q: Array, qd: Array, qdd: Array, joint: int, base: BaseMotion | None) -> str:
-    """The torque of a joint at one state (5,) in parts, for people."""
+    """Return the components of the torque of a joint at one state (5,) as text."""
     parts = breakdown(boom, q, qd, qdd, base=base, friction=True)
     unit = "N" if IS_LENGTH[joint] else "Nm"
     named = {field.name: float(getattr(parts, field.name)[joint]) for field in fields(parts)}
@@ -302,7 +334,10 @@ def shares(boom: Boom, q: Array, qd: Array, qdd: Array, joint: int, base: BaseMo
 
 
 def explain_infeasible(demands: PathDynamics) -> InfeasiblePathError:
-    """The reason why a path has no time law: the drive nearest to its limit, or beyond it, while it merely holds the load."""
+    """Return the error for a path without a time law.
+
+    It names the drive with the largest ratio of static torque to its limit.
+    """
     ratio = demands.static_ratio
     at, worst = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
     joint, s, demand = JOINTS[worst], float(demands.s[at]), float(abs(demands.c[at, worst]))
@@ -314,8 +349,8 @@ def explain_infeasible(demands: PathDynamics) -> InfeasiblePathError:
         why = f"joint {joint} needs {demand:.1f} Nm only to hold its load there ({parts}), and its drive allows {limit:.1f} Nm"
     else:
         why = (
-            f"the solver finds no speed that keeps every limit; joint {joint} comes nearest to one there, with {demand:.1f} Nm "
-            f"to hold its load of the {limit:.1f} Nm that its drive allows"
+            f"the solver finds no speed within every limit; joint {joint} is nearest to its drive limit there: it needs "
+            f"{demand:.1f} Nm to hold its load, and its drive allows {limit:.1f} Nm"
         )
     message = f"no time-optimal motion: at {s:.1%} of the path (tip {tip} m) {why}"
     return InfeasiblePathError(message, joint, s, demand, limit)

@@ -1,4 +1,4 @@
-"""Where a limit is just kept."""
+"""Root of the excess over a limit."""
 
 from collections.abc import Callable
 
@@ -6,11 +6,17 @@ _FINITE = 1e12
 
 
 def just_kept(excess: Callable[[float], float], broken: float, kept: float, accuracy: float = 1e-12) -> float:
-    """The place between two at which an excess over a limit turns 0, by Brent's method, on the side that keeps the limit.
+    """Return where the excess over a limit becomes 0, on the side that respects the limit.
+
+    Brent's method finds the root.
 
     Args:
-        excess: above 0 at `broken`, and not at `kept`; it may be infinite.
-        accuracy: how far beyond the root the answer may be, as a share of the larger of the two places.
+        excess: function of one variable, positive at `broken` and not positive at `kept`. It may be
+            infinite.
+        broken: value that exceeds the limit.
+        kept: value that respects the limit.
+        accuracy: largest distance of the result from the root, relative to the larger of |broken|
+            and |kept|.
     """
     from scipy.optimize import brentq
 

@@ -1,4 +1,4 @@
-"""How a path is travelled in time: s(t), and the motion that it gives."""
+"""Time laws s(t), and motions: a path with a time law."""
 
 from dataclasses import dataclass, replace
 from math import comb, factorial
@@ -13,45 +13,53 @@ from planner.paths.path import Path
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-_BESIDE = 1e-9  # relative; so near to a knot of the path that it stands for its side
-_BETWEEN = 32  # steps between two knots of the path, at least
-_LEFT_OF = 1e-12  # relative; so near to a piece's end that it stands for the end itself
+_BESIDE = 1e-9  # of the duration; distance from a knot of the path of the times on either side of it
+_BETWEEN = 32  # smallest number of steps between two knots of the path
+_LEFT_OF = 1e-12  # of a piece; distance from its end of the last time in it
 
 
 @dataclass(frozen=True, eq=False)
 class TimeLaw:
-    """s(t) from 0 to 1, a piecewise polynomial from rest to rest."""
+    """Piecewise polynomial s(t) from 0 to 1, from rest to rest."""
 
     s: "PPoly"
     jerk_limited: bool = False
-    """Whether the acceleration is continuous and the jerk was held to a limit."""
+    """Whether the acceleration is continuous and the jerk respects a limit."""
     iterations: int = 1
-    """Solves, of a law that is found by solving again."""
+    """Number of solves by which the law was found."""
     residual: float = 0.0
-    """How far from converged: what one more solve could still add, as a share of a limit."""
+    """Largest change that one more solve could make, relative to a limit."""
 
     @property
     def duration(self) -> float:
+        """Duration [s]."""
         return float(self.s.x[-1])
 
     def stretched(self, factor: float) -> "TimeLaw":
-        """The same law, slower by `factor`: s(t / factor)."""
+        """Return the law with its duration multiplied by `factor`: s(t / factor)."""
         powers = np.arange(len(self.s.c) - 1, -1, -1.0)[:, None]
         return replace(self, s=type(self.s)(self.s.c / factor**powers, self.s.x * factor))
 
     def times(self, each: int) -> Array:
-        """`each` equal times in every piece, its own ends included: a jump between pieces is seen from both sides."""
+        """Return `each` equally spaced times in every piece.
+
+        The first is the start of the piece and the last is just before its end, so that a jump
+        between two pieces is sampled on both sides.
+        """
         start, length = self.s.x[:-1, None], np.diff(self.s.x)[:, None]
         inside: Array = start + length * np.linspace(0.0, 1.0 - _LEFT_OF, each)
         return np.append(inside.ravel(), self.duration)
 
     def after(self, at: float) -> "TimeLaw":
-        """What is left of the law from a moment `at` within it."""
+        """Return the rest of the law from the time `at` on."""
         breaks = np.append(at, self.s.x[self.s.x > at])
         return replace(self, s=type(self.s)(self.on(breaks), breaks - at))
 
     def on(self, breaks: Array) -> Array:
-        """Coefficients (powers, pieces) of the same law between other breaks, which hold its own; at rest after its end."""
+        """Return the coefficients (powers, pieces) of the law between other breaks.
+
+        These must include the law's own breaks. The law is at rest after its end.
+        """
         pieces = np.searchsorted(self.s.x, breaks[:-1], side="right") - 1
         over = pieces >= len(self.s.x) - 1
         pieces = np.where(over, 0, pieces)
@@ -61,10 +69,11 @@ class TimeLaw:
         return np.where(over, rest, coefficients)
 
     def averaged(self, width: float) -> "TimeLaw":
-        """The law averaged over the last `width` seconds, (1/w) integral of s from t - w to t; `width` longer.
+        """Return the moving average of the law, (1/w) integral of s from t - w to t.
 
-        It travels the same path from rest to rest, and no faster. Its acceleration is continuous, from 0 to 0, and its jerk
-        at most the law's largest difference of accelerations over the width.
+        It lasts `width` seconds longer, from rest to rest, and its largest speed is not higher. Its
+        acceleration is continuous and 0 at both ends. Its jerk is at most the largest difference of
+        the law's accelerations, divided by the width.
         """
         breaks = np.union1d(self.s.x, self.s.x + width)
         kept = np.append(True, np.diff(breaks) > _LEFT_OF * breaks[-1])
@@ -87,11 +96,16 @@ class TimeLaw:
 
     @staticmethod
     def from_pieces(durations: ArrayLike, coefficients: ArrayLike, jerk_limited: bool = False) -> "TimeLaw":
-        """A law from the duration of each piece and its coefficients, highest power first, shape (powers, pieces).
+        """Return the law with given durations and coefficients of its pieces.
 
-        Pieces of no duration are left out.
+        Pieces of zero duration are left out.
+
+        Args:
+            durations: (pieces,) [s].
+            coefficients: (powers, pieces), highest power first.
+            jerk_limited: see the field.
         """
-        from scipy.interpolate import PPoly  # a third of a second, which `boom ik` does not need
+        from scipy.interpolate import PPoly  # slow to import, and `boom ik` does not need it
 
         durations, coefficients = np.asarray(durations, dtype=float), np.asarray(coefficients, dtype=float)
         kept = durations > 0.0
@@ -100,7 +114,7 @@ class TimeLaw:
 
 
 def _moved(coefficients: Array, by: Array) -> Array:
-    """Polynomials (powers, pieces), highest power first, with their origins moved by (pieces,)."""
+    """Return polynomials (powers, pieces), highest power first, with origins moved by (pieces,)."""
     order = len(coefficients)
     moved = np.zeros_like(coefficients)
     for power in range(order):
@@ -111,19 +125,21 @@ def _moved(coefficients: Array, by: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A path travelled by a time law."""
+    """Path with a time law."""
 
     path: Path
     law: TimeLaw
 
     @property
     def duration(self) -> float:
+        """Duration [s]."""
         return self.law.duration
 
     def times(self, samples: int) -> Array:
-        """At least that many times, equal within each piece of the law, with both sides of every jump of law and path.
+        """Return at least `samples` times, equally spaced in each piece of the law.
 
-        Between two knots of the path, however near, there are some as well.
+        They include both sides of each break of the law and of each knot of the path, and several
+        times between any two knots.
         """
         t = self.law.times(max(3, -(-samples // (len(self.law.s.x) - 1))))
         passed = [self.law.s.solve(knot, extrapolate=False) for knot in self.path.knots]
@@ -136,13 +152,15 @@ class Motion:
         return np.sort(np.concatenate([t, np.clip(beside, 0.0, self.duration), between.ravel()]))
 
     def __call__(self, t: ArrayLike) -> tuple[Array, Array, Array, Array]:
-        """q, qd, qdd and qddd at the times t, each (..., 5), by the chain rule; t outside the move is clipped to it.
+        """Return q, qd, qdd and qddd at times t, each (..., 5).
 
-        qd = p' s',  qdd = p'' s'^2 + p' s'',  qddd = p''' s'^3 + 3 p'' s' s'' + p' s'''.
+            qd = p' s',  qdd = p'' s'^2 + p' s'',  qddd = p''' s'^3 + 3 p'' s' s'' + p' s'''
+
+        Times outside the motion are clipped to it.
         """
         inside = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         s, v, a, j = (np.asarray(self.law.s(inside, order)) for order in range(4))
-        s, v = np.clip(s, 0.0, 1.0), np.maximum(v, 0.0)  # no law goes back, rounding apart: friction has a direction
+        s, v = np.clip(s, 0.0, 1.0), np.maximum(v, 0.0)  # s never decreases except by rounding, which would reverse friction
         p = [self.path(s, order) for order in range(4)]
         v, a, j = v[..., None], a[..., None], j[..., None]
         return p[0], p[1] * v, p[2] * v**2 + p[1] * a, p[3] * v**3 + 3.0 * p[2] * v * a + p[1] * j

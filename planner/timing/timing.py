@@ -1,4 +1,4 @@
-"""From paths to motions: each profile's own law, the duration that is asked for, a controller's clock."""
+"""Timing of paths by a profile, with a given duration and the clock of a controller."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -17,19 +17,19 @@ from planner.timing.worst_ratios import WorstRatio, joint_stretch, worst_ratios
 __all__ = ["Profile", "Timing", "timed"]
 
 _ROUNDING = 1e-9
-_MISSED = 1e-5  # relative; what is missed by less is left as it is
-_TRIES = 5  # the derivatives of a very short line of the tip are rounding in part, and come out otherwise each time
+_MISSED = 1e-5  # relative; a smaller excess over a limit is not corrected
+_TRIES = 5  # slowing may not converge: on a very short tip line, rounding changes the derivatives each time
 
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """What is asked of a motion's timing."""
+    """Requested timing of a motion."""
 
     profile: TimingProfile
     duration: float | None = None
-    """[s]; None is the least."""
+    """[s]; None is the shortest that the limits allow."""
     rate: float | None = None
-    """[Hz] of a controller, on whose clock the motion and its parts end."""
+    """Rate of a controller [Hz]; the motion and its parts last whole periods of it."""
 
     @staticmethod
     def of(
@@ -40,10 +40,19 @@ class Timing:
         velocities: Array | None = None,
         rate: float | None = None,
     ) -> "Timing":
-        """Timing, checked. The options beside a profile's word are those of `parse_profile`.
+        """Return a checked timing.
+
+        Args:
+            profile: a profile, or its word with the options of `parse_profile`.
+            duration: [s]; None is the shortest that the limits allow.
+            jerk_bound: see `parse_profile`.
+            average_torque: see `parse_profile`.
+            velocities: see `parse_profile`.
+            rate: rate of a controller [Hz].
 
         Raises:
-            InputError: no such profile, not a positive number, or an option of another profile.
+            InputError: the profile is unknown, a number is not positive, or an option belongs to
+                another profile.
         """
         if not isinstance(profile, TimingProfile):
             profile = parse_profile(profile, jerk_bound=jerk_bound, average_torque=average_torque, velocities=velocities)
@@ -54,10 +63,13 @@ class Timing:
 
 
 def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | None) -> tuple[Motion, ...]:
-    """A motion along each path, from rest to rest, of the duration that is asked for in all.
+    """Return a motion from rest to rest along each path; their total duration is the requested one.
 
     Raises:
-        InfeasibleError: the duration is too short, no motion keeps the drives' limits, or it comes too near to a shape.
+        InputError: one period of the rate is longer than the move, or velocities at waypoints do
+            not match the path.
+        InfeasibleError: the duration is too short, no motion respects the drive limits, or a motion
+            comes too near to a shape.
     """
     if isinstance(timing.profile, Cubic) and timing.profile.velocities is not None:
         return (_with_velocities(boom, paths, timing, timing.profile.velocities, base),)
@@ -79,7 +91,10 @@ def _slowed(motion: Motion, factor: float) -> Motion:
 
 
 def _least(boom: Boom, path: Path, timing: Timing, base: BaseMotion | None) -> Motion:
-    """The profile's least-time motion, slowed by what its own look at the path missed."""
+    """Return the shortest motion of the profile.
+
+    It is slowed if a finer grid than the profile's shows that it exceeds a limit.
+    """
     motion = timing.profile.motion(boom, path, base)
     if isinstance(path, JointLine) and timing.profile.exact_on_lines:
         return motion
@@ -99,8 +114,8 @@ def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, velociti
     count = len(path.waypoints) - 2 if isinstance(path, SplinePath) else 0
     if not isinstance(path, SplinePath) or velocities.shape != (count, 5):
         raise InputError(
-            f"velocities have shape {velocities.shape}; with {count} waypoints, without those where the move already is, it "
-            f"must be ({count}, 5)"
+            f"velocities have shape {velocities.shape}; with {count} waypoints, not counting those where the move already "
+            f"is, it must be ({count}, 5)"
         )
     motion = cubic_with_velocities(boom, path.waypoints, velocities, timing.duration, base)
     if timing.rate is not None:
@@ -113,7 +128,7 @@ def _with_velocities(boom: Boom, paths: Sequence[Path], timing: Timing, velociti
 def _too_short(
     boom: Boom, motions: Sequence[Motion], timing: Timing, asked: float, least: float, base: BaseMotion | None
 ) -> str:
-    """How far a duration is from the least, and which limit it would break most."""
+    """Return the message for a duration that is too short, with the limit exceeded most."""
     hasty = [_slowed(motion, asked / least) for motion in motions]
     worst = max(worst_ratios(boom, hasty, base, timing.profile.limits_average_torque), key=lambda each: each.ratio)
     when = "" if worst.at_s is None else f" at {worst.at_s:.2f} s"
@@ -128,7 +143,7 @@ _INSTANT = ("gearbox torque", "motor torque", "motor torque at standstill")
 
 
 def _parts(boom: Boom, motions: Sequence[Motion], worst: WorstRatio, base: BaseMotion | None) -> str:
-    """What the worst torque consists of."""
+    """Return the components of the worst torque as text."""
     at = worst.at_s or 0.0
     for motion in motions:
         if at <= motion.duration:

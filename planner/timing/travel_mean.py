@@ -1,4 +1,4 @@
-"""Means of a load over a motion, weighted by travel, as gearbox makers judge them."""
+"""Means of a load over a motion, weighted by travel, as on gearbox datasheets."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from boom_model.arrays import Array, read_only
 
 
 def trapezoid_weights(t: Array) -> Array:
-    """Weights (n,) [s] of the trapezoidal rule at times t (n,)."""
+    """Return the weights (n,) [s] of the trapezoidal rule at times t (n,)."""
     weight = np.zeros(t.shape)
     weight[:-1] += np.diff(t) / 2.0
     weight[1:] += np.diff(t) / 2.0
@@ -14,11 +14,14 @@ def trapezoid_weights(t: Array) -> Array:
 
 
 def travel_mean(weight: Array, load: Array, rate: Array) -> float | None:
-    """Cube mean of a load weighted by travel, (int |rate| |load|^3 dt / int |rate| dt)^(1/3); None without travel.
+    """Return the cubic mean of a load weighted by travel; None without travel.
+
+        (int |rate| |load|^3 dt / int |rate| dt)^(1/3)
 
     Args:
-        weight: (n,) how long each sample lasts [s].
-        load, rate: (n,)
+        weight: (n,) duration of each sample [s].
+        load: (n,) torque or force.
+        rate: (n,) velocity.
     """
     share = weight * np.abs(rate)
     travel = float(share.sum())
@@ -26,8 +29,11 @@ def travel_mean(weight: Array, load: Array, rate: Array) -> float | None:
 
 
 def average_torque(t: Array, tau: Array, qd: Array) -> float | None:
-    """Cube mean of the torque weighted by speed, (int |qd| |tau|^3 dt / int |qd| dt)^(1/3) [Nm]; None for a joint that rests.
+    """Return the cubic mean of the torque weighted by speed [Nm]; None for a joint at rest.
 
-    Harmonic Drive's average torque. Its weight loses what is only held: see the hold row.
+        (int |qd| |tau|^3 dt / int |qd| dt)^(1/3)
+
+    This is Harmonic Drive's average torque. It does not include static torque at standstill, which
+    the hold check covers.
     """
     return travel_mean(trapezoid_weights(t), tau, qd)

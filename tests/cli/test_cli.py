@@ -349,9 +349,9 @@ def test_missions_stand_side_by_side(boom, tmp_path):
     code, out, _ = boom("mission", "table-2-4", "table-3-1", "--json")
     assert sorted(json.loads(out)["missions"]) == ["table 2-4", "table 3-1"]
     code, _, err = boom("mission", "table-2-4", "table-3-1", "--picture", "x.png")
-    assert (code, "a page shows one mission" in err) == (2, True)
+    assert (code, "it shows one mission" in err) == (2, True)
     code, _, err = boom("mission", "table-2-4", "table-2-4")
-    assert (code, "two missions bear one name" in err) == (2, True)
+    assert (code, "two missions have the same name" in err) == (2, True)
     code, _, err = boom("mission", "table-2-4", "--joint", "elbow")
     assert (code, "unknown joint 'elbow'; there are: yaw" in err) == (2, True)
     assert boom("mission", "field-day", "--payload", "30")[0] == 1  # its gearboxes fail
@@ -422,7 +422,7 @@ def test_plan_and_check_draw_the_drives(boom, tmp_path):
     boom("plan", "transport", "phenotyping", "--csv", "move.csv", "--picture", "plan.png")
     boom("check", "move.csv", "--picture", "check.png")
     code, _, err = boom("check", "move.csv", "--picture", "check.pdf")
-    assert (code, "check.pdf: the drives' page is written as .png" in err) == (2, True)
+    assert (code, "check.pdf: the page of the drives is written as .png" in err) == (2, True)
     for name in ("plan.png", "check.png"):
         assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
 

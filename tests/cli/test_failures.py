@@ -124,9 +124,9 @@ def test_python_runs_the_package(tmp_path):
     [
         (KeyError("x"), 70, "boom: internal error: KeyError: 'x'; please report it"),
         (AssertionError(), 70, "boom: internal error: AssertionError"),
-        (RecursionError("maximum recursion depth exceeded"), 2, "beyond what can be computed: maximum recursion"),
-        (MemoryError(), 2, "beyond what can be computed: MemoryError"),
-        (RuntimeWarning("overflow encountered in multiply"), 2, "beyond what can be computed: overflow"),
+        (RecursionError("maximum recursion depth exceeded"), 2, "too large or too small to compute with: maximum recursion"),
+        (MemoryError(), 2, "too large or too small to compute with: MemoryError"),
+        (RuntimeWarning("overflow encountered in multiply"), 2, "too large or too small to compute with: overflow"),
         (FileNotFoundError(2, "No such file or directory", "x"), 2, "boom: x: No such file or directory"),
     ],
     ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else "",
@@ -155,7 +155,7 @@ def test_numpys_warning_ends_the_command(tmp_path):
     python = [sys.executable, "-c", code, "validate"]
     done = subprocess.run(python, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr == "boom: the numbers given are beyond what can be computed: overflow encountered in multiply\n"
+    assert done.stderr == "boom: a number is too large or too small to compute with: overflow encountered in multiply\n"
 
 
 # Bad input
@@ -288,7 +288,7 @@ def test_parquet_notes_that_are_nested_deep_are_no_notes(boom, tmp_path):
         ),
         (
             ("size", "table-3-1", "--joint", "inner", "--voltage", "12"),
-            "boom: no drive of the catalogue does the mission: inner, as it is\n",
+            "boom: no drive of the catalogue is suitable for the mission: inner, as it is\n",
         ),
     ],
     ids=["mission", "size"],

@@ -55,7 +55,7 @@ MISTAKES = [
     ("plan transport phenotyping --out move.mp4", "move.mp4: the name must end in .rrd"),
     ("plan transport phenotyping --csv move.xlsx", "move.xlsx: the name must end in .csv"),
     ("plan transport phenotyping --report move.docx", "move.docx"),
-    ("view motion.csv", "motion.csv: is no Rerun recording"),
+    ("view motion.csv", "motion.csv: not a Rerun recording"),
     ("view", "no recording (.rrd) here; boom plan transport phenotyping makes one"),
     ("check nowhere.csv", "nowhere.csv: cannot be read: No such file or directory"),
     ("export-model boom.sdf", "must end in .urdf, or in .xml for MuJoCo"),

@@ -129,7 +129,7 @@ def test_a_flat_linkage_and_no_motion_are_refused():
     q = np.array([[0.0, 0.0, np.pi, 0.0, 0.0]])
     still = Trajectory.from_samples([0.0], q, np.zeros((1, 5)), np.zeros((1, 5)))
     cases_of = load_link(BOOM, "inner")
-    with pytest.raises(InputError, match="there is no motion"):
+    with pytest.raises(InputError, match="no motion is given"):
         link_cases(BOOM, cases_of, [])
     with pytest.raises(InputError, match="motion 1, t = 0 s: the linkage is flat"):
         link_cases(BOOM, cases_of, [still])

@@ -21,7 +21,7 @@ _EACH = 3
 
 
 def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
-    """The fastest law found whose average torque no gearbox's sheet forbids.
+    """Find the fastest law within the average torque limits of the gearboxes.
 
     Along a path the average, (int |tau|^3 |p'| ds / int |p'| ds)^(1/3), depends on the whole motion, which toppra cannot
     take in. Two ways are searched, and the faster taken: a cap on the gearboxes' torque, between what holding the
@@ -64,7 +64,7 @@ def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None
 
 
 def _torque(boom: Boom, motion: Motion, base: BaseMotion | None) -> tuple[Array, Array, Array]:
-    """Times, joint velocities and torques of a motion."""
+    """Return times, joint velocities and torques of a motion."""
     t = motion.law.times(_EACH)
     q, qd, qdd, _ = motion(t)
     return t, qd, inverse_dynamics(boom, q, qd, qdd, base=base, friction=True, reactions=False).tau
@@ -76,7 +76,7 @@ def _averages(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None) -> 
 
 
 def _capped(boom: Boom, caps: Array) -> Boom:
-    """The boom with gearboxes that bear no more than `caps` (5,)."""
+    """Return the boom with gearbox limits of at most `caps` (5,)."""
     drives: list[Drive | None] = []
     for drive, cap in zip(boom.drives, caps, strict=True):
         limit = None if drive is None else drive.gearbox.start_stop_torque

@@ -20,7 +20,9 @@ _LOOKS = 129
 
 
 def cubic_through(boom: Boom, waypoints: Array, base: BaseMotion | None = None) -> Motion:
-    """A cubic spline in time through waypoints (n, 5), its acceleration continuous, at rest at both ends.
+    """Find a cubic spline in time through waypoints (n, 5), from rest to rest.
+
+    Its acceleration is continuous.
 
     The durations between waypoints are those of the shortest such motion within the limits of joints and drives, as the
     simplex search of Nelder and Mead finds it (Lin, Chang and Luh, IEEE Trans. Automatic Control 28, 1983): a good one, not
@@ -111,7 +113,7 @@ def _knots(shares: Array) -> Array:
 
 
 def _least_segment(boom: Boom, segment: int, q: Array, qd: Array, base: BaseMotion | None) -> float:
-    """The least duration [s] of the cubic from q[0] to q[1] with velocities qd[0] and qd[1] that keeps the limits."""
+    """Return the shortest duration [s] within the limits of a cubic between two states q, qd."""
     tau = np.linspace(0.0, 1.0, _LOOKS)[:, None]
     rise, slope = tau**2 * (3.0 - 2.0 * tau), 6.0 * tau * (1.0 - tau)
     bend = 6.0 - 12.0 * tau

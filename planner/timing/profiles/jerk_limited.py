@@ -14,9 +14,9 @@ _ROUNDING = 1e-9
 
 
 def jerk_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
-    """A law from rest to rest under velocity, acceleration and jerk limits, and the drives' own.
+    """Find a law from rest to rest within velocity, acceleration, jerk and drive limits.
 
-    ruckig's: the least-time one where the path is straight and no drive limits. Elsewhere it must be slowed, and the
+    It is ruckig's: the least-time one where the path is straight and no drive limits. Elsewhere it must be slowed, and the
     time-optimal law with its jerk bounded can be the faster of the two: then that is taken.
 
     Raises:
@@ -27,13 +27,13 @@ def jerk_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> Time
         return law
     try:
         other = jerk_bounded(boom, path, base)
-    except InfeasibleError:  # a drive cannot hold the load: no law mends it, and the checks say so
+    except InfeasibleError:  # a drive cannot hold the load: no law helps, and the checks report it
         return law
     return min(law, other, key=lambda each: each.duration)
 
 
 def evenly_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> tuple[TimeLaw, float]:
-    """ruckig's law, and by how much it had to be slowed.
+    """Return the law of ruckig, and the factor by which it is slowed.
 
     One law s(t) for all joints, its limits the least of limit / |p'| over joints and path, slowed evenly where the path's
     curvature or a drive asks for it.

@@ -48,7 +48,7 @@ def time_optimal(
     even: bool = False,
     jerk_share: float | None = None,
 ) -> TimeLaw:
-    """The least-time law from rest to rest under velocity, acceleration and drive torque limits.
+    """Find the least-time law from rest to rest within velocity, acceleration and drive limits.
 
     The path acceleration is constant over each of the `GRID_INTERVALS` steps in s, and the conditions hold at both ends of each
     (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step. The steps are
@@ -61,6 +61,9 @@ def time_optimal(
     settle on a rough grid, from which the full one starts.
 
     Args:
+        boom: the boom.
+        path: the path.
+        base: tilt of the base, which must not move; None is level.
         even: whether all steps are equal, and none is looked into. Between near knots such a law is smoother, and must be
             slowed for what it breaks.
         jerk_share: the share of the joints' jerk limits that |p'''| s'^3 may take, the part that the path's shape asks for;
@@ -99,7 +102,7 @@ def _shape_cap(boom: Boom, path: Path, s: Array) -> Array:
 
 
 def _repaired(demands: PathDynamics, found: "_Found", unit: float) -> TimeLaw:
-    """The law of a solve, slower where a limit is broken inside a step.
+    """Return the law of a solve, slower where a limit is exceeded inside a step.
 
     Where a joint turns back p' is 0 and p'' may jump: there the speed that both ends of a step allow can be too much between
     them, however short the step. It is capped at both ends, and solved for again; of all these laws that is taken which is
@@ -162,7 +165,7 @@ def _time_scale(demands: PathDynamics) -> float:
 
 
 def _iterate(demands: PathDynamics, path: Path, x: Array, unit: float) -> _Found | None:
-    """The law of the last solve, the first with tangents at x (n,); None where there is none."""
+    """Return the law of the last solve, the first with tangents at x (n,); None if infeasible."""
     found, rows = None, _rows(demands, x)
     for solves in range(1, _SOLVES + 1):
         solved = _solve(_Condition(_breakable(rows, demands), demands.x_max, unit), path, demands.s)
@@ -187,7 +190,7 @@ def _gain(s: Array, speed: Array, old: _Rows, new: _Rows) -> float:
 
 
 def _breakable(rows: _Rows, demands: PathDynamics) -> _Rows:
-    """The rows that some u and x within the joints' own limits would break: few are, and each costs time."""
+    """Return the rows that some u and x within the joint limits can break; the others cost time."""
     a, b, c = rows
     x = np.minimum(demands.x_max, _FINITE)
     with np.errstate(divide="ignore"):
@@ -228,7 +231,9 @@ def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
 
 
 def _solve(condition: "_Condition", path: Path, s: Array) -> Array | None:
-    """s' at the grid points, in the condition's unit of time, by reachability analysis; None where there is none.
+    """Return s' at the grid points by reachability analysis; None if infeasible.
+
+    s' is in the unit of time of the condition.
 
     Backwards from rest the largest x from which rest can be reached, then forwards as fast as these allow. toppra's own loop
     also asks for the least such x; here it is 0, because the load can be held at rest everywhere.

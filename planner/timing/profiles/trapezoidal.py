@@ -9,10 +9,11 @@ from planner.timing.time_law import TimeLaw
 
 
 def trapezoidal(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
-    """The trapezoid of the least speed and acceleration limit / |p'| over joints and path; a triangle where it is short.
+    """Return the trapezoid with the smallest limit / |p'| of speed and acceleration.
 
-    With speed v and acceleration a it takes 1/v + v/a where v^2 <= a, and 2 / sqrt(a) otherwise. It is slowed evenly where
-    the path's curvature or a drive asks for it.
+    The minimum is over joints and path. With speed v and acceleration a, the law takes 1/v + v/a if
+    v^2 <= a. Otherwise it is a triangle, which takes 2 / sqrt(a). It is slowed evenly where the
+    curvature of the path or a drive requires it.
     """
     velocity, acceleration, _ = path_limits(boom, path)
     speed = min(velocity, np.sqrt(acceleration))
