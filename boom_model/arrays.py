@@ -1,5 +1,7 @@
 """Checks of arrays at the public boundary, and read-only arrays for frozen data."""
 
+from math import isfinite
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -34,7 +36,8 @@ def checked(name: str, values: ArrayLike, last: int | None = None) -> Array:
         raise InputError(f"{name} is not an array of numbers: {error}") from None
     if last is not None and (array.ndim == 0 or array.shape[-1] != last):
         raise InputError(f"{name} has shape {array.shape}; its last axis must have length {last}")
-    if not np.isfinite(array).all():
+    # A sum of squares is finite where all is, short of overflow: the one quick look at a small array.
+    if not isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f"{name}[{', '.join(map(str, index))}]" if index else name
         raise InputError(f"{where} is {array[index]}; it must be a finite number")
@@ -60,7 +63,7 @@ def broadcast(**named: ArrayLike) -> tuple[Array, ...]:
         InputError: as `checked`, or the shapes do not broadcast.
     """
     arrays = [checked(name, values, 5) for name, values in named.items()]
-    if all(array.shape == arrays[0].shape for array in arrays):
+    if len({array.shape for array in arrays}) == 1:
         return tuple(arrays)
     try:
         return tuple(np.broadcast_arrays(*arrays))

@@ -34,6 +34,8 @@ def main() -> None:
         signal.signal(number, _stop)
     import warnings
 
+    # The matrices are small: threads of linear algebra would only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     os.environ["MPLBACKEND"] = "agg"  # pictures go to files, whatever backend the user has set
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # a file name may have any byte

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import tan
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,7 +38,7 @@ _CHUNK = 1280
 a second one gains nothing on so thin a matrix, and waits for its turn on a busy machine."""
 
 _O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
-_BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
+BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
 _LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
 
 
@@ -115,33 +115,41 @@ def inverse_dynamics(
         raise InputError(f"payload_as is {payload_as!r}; it must be 'mass' or 'force'")
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
-    motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]
-    outside = [] if base is None else [_vectors(f"base {name}", getattr(base, name), shape) for name in _BASE_ENTRIES]
-    push = None if tip_force is None else _vectors("tip_force", tip_force, shape)
-    twist = None if tip_moment is None else _vectors("tip_moment", tip_moment, shape)
+    motion = [x.reshape(-1, 5) for x in (positions, rates, accelerations)]
+    outside = [] if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
+    push = None if tip_force is None else matched("tip_force", tip_force, shape)
+    twist = None if tip_moment is None else matched("tip_moment", tip_moment, shape)
     count = len(motion[0])
     out = _Outputs(
         np.empty((count, 5)),
         np.zeros((3, count, 3)) if reactions else None,
         np.empty((count, 6)) if reactions else None,
     )
-    model = _model(boom, payload_as)
+    model = regrouped(boom, payload_as)
     rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) if drive_inertia else None
-    for start in range(0, count, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        state = _state(*(x[part] for x in motion))
-        plane = _plane(boom, state, *(_columns(x[part]) for x in outside))
-        applied = _Applied(*(None if x is None else _into_plane(state, _columns(x[part])) for x in (push, twist)))
-        _newton_euler(model, state, plane, applied, out.part(part))
+
+    def fill(motion: list[Array], outside: list[Array], push: Array | None, twist: Array | None, out: _Outputs) -> None:
+        state = _state(motion)
+        plane = _plane(boom, state, *map(_columns, outside))
+        force = None if push is None else _into_plane(state, _columns(push))
+        moment = None if twist is None else _into_plane(state, _columns(twist))
+        _newton_euler(model, state, plane, force, moment, out)
         if friction:
-            out.tau[part] += boom.friction.torque(motion[1][part])
+            out.tau[:] += boom.friction.torque(motion[1])
         if rotors is not None:
-            out.tau[part] += rotors * motion[2][part]
-    return Loads(
-        tau=out.tau.reshape(*shape, 5),
-        pins=None if out.pins is None else PinForces(*(p.reshape(*shape, 3) for p in out.pins)),
-        mount=None if out.mount is None else out.mount.reshape(*shape, 6),
-    )
+            out.tau[:] += rotors * motion[2]
+
+    if count <= _CHUNK:
+        fill(motion, outside, push, twist, out)
+    else:
+        for start in range(0, count, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            applied, turned = (None if x is None else x[part] for x in (push, twist))
+            fill([x[part] for x in motion], [x[part] for x in outside], applied, turned, out.part(part))
+    pins, mount = None, None
+    if out.pins is not None and out.mount is not None:
+        pins, mount = PinForces(*(p.reshape(*shape, 3) for p in out.pins)), out.mount.reshape(*shape, 6)
+    return Loads(out.tau.reshape(positions.shape), pins, mount)
 
 
 def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
@@ -158,12 +166,14 @@ def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
     return np.stack([-(c * x + s * z), s * x - c * z, np.zeros_like(x)], axis=-1)
 
 
-class _Model(NamedTuple):
+class Regrouped(NamedTuple):
     """The boom's masses, regrouped."""
 
     boom: Boom
     rows: Array
     """(17, 11): Q of all bodies; then Q of the outer link (o, e2, p2) and of all beyond pins 7 and 8 (o, e3, p3)."""
+    torque_rows: Array
+    """(11, 11): Q of all bodies alone."""
     tip: Array
     """(11,) g of the tip."""
     payload: Array
@@ -173,7 +183,8 @@ class _Model(NamedTuple):
 
 
 @lru_cache(maxsize=16)
-def _model(boom: Boom, payload_as: PayloadAs) -> _Model:
+def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
+    """Return the regrouped masses of a boom, with the payload as a mass or as a force."""
     elements = _elements(boom)
     bodies = {**boom.bodies, "payload": boom.payload}
     Q = {name: elements[name].T @ _pseudo_inertia(body, R_LINK_BODY[name]) @ elements[name] for name, body in bodies.items()}
@@ -182,9 +193,10 @@ def _model(boom: Boom, payload_as: PayloadAs) -> _Model:
     top = sum((Q[name] for name in ("upper", "extension", "end_effector", "payload")), np.zeros((11, 11)))
     rows = [sum(Q.values(), np.zeros((11, 11))), Q["outer"][[_O, _E2, _P2]], top[[_O, _E3, _P3]]]
     com = R_LINK_BODY["payload"] @ boom.payload.com
-    return _Model(
+    return Regrouped(
         boom=boom,
         rows=read_only(np.concatenate(rows)),
+        torque_rows=read_only(rows[0]),
         tip=elements["payload"][0],
         payload=elements["payload"].T @ [1.0, *com],
         hanging=boom.payload.mass if payload_as == "force" else 0.0,
@@ -224,6 +236,9 @@ def _pseudo_inertia(body: Body, R: Array) -> Array:
 _Value = Array | float
 """(n,) of a chunk, or the number of a single state: Python's own arithmetic is ten times quicker on it than NumPy's."""
 
+_Rows = Array | list[list[float]]
+"""Values of vectors along x, z and n: an array (3, k, n), or three lists of k numbers of a single state."""
+
 
 class _State(NamedTuple):
     """A chunk of states, each five values."""
@@ -233,9 +248,10 @@ class _State(NamedTuple):
     qdd: Sequence[_Value]
 
 
-def _state(*motion: Array) -> _State:
-    if len(motion[0]) == 1:
-        return _State(*(x[0].tolist() for x in motion))
+def _state(motion: list[Array]) -> _State:
+    q, qd, qdd = motion
+    if len(q) == 1:
+        return _State(q[0].tolist(), qd[0].tolist(), qdd[0].tolist())
     return _State(*(list(np.ascontiguousarray(x.T)) for x in motion))
 
 
@@ -244,22 +260,19 @@ def _columns(vectors: Array) -> Sequence[_Value]:
     return vectors[0].tolist() if len(vectors) == 1 else list(vectors.T)
 
 
+_Vector = tuple[_Value, _Value, _Value]
+"""Along the axes x, z and n of the arm's plane."""
+
+
 class _Plane(NamedTuple):
-    """How the arm's plane moves, along its axes x, z and n; three entries (n,) or 0 each."""
+    """How the arm's plane moves; entries (n,) or a number each."""
 
-    lift: tuple[_Value, _Value, _Value]
+    lift: _Vector
     """minus gravity"""
-    a: tuple[_Value, _Value, _Value]
+    a: _Vector
     """a0 minus gravity"""
-    W: tuple[_Value, _Value, _Value]
-    W1: tuple[_Value, _Value, _Value]
-
-
-class _Applied(NamedTuple):
-    """Force and moment on the tip along the plane's axes."""
-
-    force: tuple[_Value, _Value, _Value] | None
-    moment: tuple[_Value, _Value, _Value] | None
+    W: _Vector
+    W1: _Vector
 
 
 class _Outputs(NamedTuple):
@@ -276,7 +289,12 @@ class _Outputs(NamedTuple):
         )
 
 
-def _vectors(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return checked vectors (n, 3) for the n states of a shape.
+
+    Raises:
+        InputError: they are not finite or not (..., 3), or the shape does not match.
+    """
     values = checked(name, values, 3)
     try:
         return np.reshape(np.broadcast_to(values, (*shape, 3)), (-1, 3))
@@ -284,7 +302,7 @@ def _vectors(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise InputError(f"{name} has shape {values.shape}; it does not match states of shape {(*shape, 5)}") from None
 
 
-def _into_plane(state: _State, vector: Sequence[_Value]) -> tuple[_Value, _Value, _Value]:
+def _into_plane(state: _State, vector: Sequence[_Value]) -> _Vector:
     """Return the components of a vector, given along frame 1, along x, z and n of the plane."""
     c, s = _cosine_and_sine(state.q[0])
     return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
@@ -304,21 +322,22 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1))
 
 
-def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> Array:
+def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> _Rows:
     """Return A, the acceleration of each vector b, along x, z and n.
 
-    Its shape is (3, 11, n), or (3, 11) for a single state.
+    It is an array (3, 11, n), or three lists for a single state.
 
     C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
     """
-    A = np.empty((3, 11, *np.shape(rho)))
+    A: Any = [[0.0] * 11, [0.0] * 11, [0.0] * 11] if isinstance(rho, float) else np.empty((3, 11, *rho.shape))
+    Ax, Az, An = A
     w1, w2, w3 = plane.W
     d1, d2, d3 = plane.W1
     w11, w22, w33, w12, w13, w23 = w1 * w1, w2 * w2, w3 * w3, w1 * w2, w1 * w3, w2 * w3
-    A[0, _O], A[1, _O], A[2, _O] = plane.a
-    A[0, _X], A[1, _X], A[2, _X] = -(w22 + w33), w12 + d3, w13 - d2
-    A[0, _Z], A[1, _Z], A[2, _Z] = w12 - d3, -(w11 + w33), w23 + d1
-    A[0, _N], A[1, _N], A[2, _N] = w13 + d2, w23 - d1, -(w11 + w22)
+    Ax[_O], Az[_O], An[_O] = plane.a
+    Ax[_X], Az[_X], An[_X] = -(w22 + w33), w12 + d3, w13 - d2
+    Ax[_Z], Az[_Z], An[_Z] = w12 - d3, -(w11 + w33), w23 + d1
+    Ax[_N], Az[_N], An[_N] = w13 + d2, w23 - d1, -(w11 + w22)
     qd, qdd = state.qd, state.qdd
     rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
     for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
@@ -327,75 +346,82 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
         along_x, along_z = square + w22, square + w11
         less, more = accel + d3 - w12, accel + d3 + w12
         k, m = double * w1 + w13 - d2, double * w2 + w23 + d1
-        A[0, e] = -along_x * c - less * s
-        A[1, e] = more * c - along_z * s
-        A[2, e] = k * c + m * s
-        A[0, p] = along_x * s - less * c
-        A[1, p] = -more * s - along_z * c
-        A[2, p] = m * c - k * s
+        Ax[e] = -along_x * c - less * s
+        Az[e] = more * c - along_z * s
+        An[e] = k * c + m * s
+        Ax[p] = along_x * s - less * c
+        Az[p] = -more * s - along_z * c
+        An[p] = m * c - k * s
     c, s, slide = C[1], S[1], 2.0 * qd[3]
     turning = slide * (qd[2] + w3)
-    A[:, _RHO] = rho * A[:, _E3]
-    A[0, _RHO] += qdd[3] * c - turning * s
-    A[1, _RHO] += qdd[3] * s + turning * c
-    A[2, _RHO] += slide * (w1 * s - w2 * c)
-    return A
+    Ax[_RHO] = rho * Ax[_E3] + (qdd[3] * c - turning * s)
+    Az[_RHO] = rho * Az[_E3] + (qdd[3] * s + turning * c)
+    An[_RHO] = rho * An[_E3] + slide * (w1 * s - w2 * c)
+    rows: _Rows = A
+    return rows
 
 
-def _newton_euler(model: _Model, state: _State, plane: _Plane, applied: _Applied, out: _Outputs) -> None:
-    """Fill the outputs of a chunk."""
+def _newton_euler(
+    model: Regrouped, state: _State, plane: _Plane, force: _Vector | None, moment: _Vector | None, out: _Outputs
+) -> None:
+    """Fill the outputs of a chunk, with a force and a moment on the tip."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
-    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[1], q[2], q[2] + q[4]))
+    (c2, s2), (c3, s3), (ct, st) = _cosine_and_sine(q[1]), _cosine_and_sine(q[2]), _cosine_and_sine(q[2] + q[4])
     A = _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), rho)
-    rows = model.rows if out.pins is not None else model.rows[:11]
-    U = rows @ A if A.ndim == 3 else A @ rows.T
+    rows = model.rows if out.pins is not None else model.torque_rows
+    U = np.array(A[0] + A[1] + A[2]).reshape(3, 11).dot(rows.T) if isinstance(A, list) else rows @ A
     if model.hanging:
         _put_on(
             U, model.payload, (-model.hanging * plane.lift[0], -model.hanging * plane.lift[1], -model.hanging * plane.lift[2])
         )
-    if applied.force is not None:
-        _put_on(U, model.tip, applied.force)
-    moment = (0.0, 0.0, 0.0) if applied.moment is None else applied.moment
+    if force is not None:
+        _put_on(U, model.tip, force)
+    mx, mz, mn = (0.0, 0.0, 0.0) if moment is None else moment
+    Ux, Uz, Un = U.tolist() if isinstance(A, list) else U
 
-    def about(c: _Value, s: _Value, e: Array, p: Array) -> _Value:
+    def about(c: _Value, s: _Value, e: int, p: int) -> _Value:
         """Return (b_e x U_e + b_p x U_p) . n."""
-        turned: _Value = c * (e[1] - p[0]) - s * (e[0] + p[1])
+        turned: _Value = c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
         return turned
 
-    on_tool = about(ct, st, U[:, _ET], U[:, _PT]) - moment[2]
-    beyond_actuator = rho * (c3 * U[1, _RHO] - s3 * U[0, _RHO]) + on_tool
+    on_tool = about(ct, st, _ET, _PT) - mn
+    beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
     # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
-    reach = ((c2, _E2, -s2, _P2), (c3, _E3, -s3, _P3), (rho * c3, _RHO, 0.0, _O), (ct, _ET, -st, _PT))
-    out.tau[:, 0] = U[0, _N] - U[2, _X] - sum(a * U[2, i] + b * U[2, j] for a, i, b, j in reach) - moment[1]
-    out.tau[:, 1] = about(c2, s2, U[:, _E2], U[:, _P2])
-    out.tau[:, 2] = about(c3, s3, U[:, _E3], U[:, _P3]) + beyond_actuator
-    out.tau[:, 3] = c3 * U[0, _RHO] + s3 * U[1, _RHO]
-    out.tau[:, 4] = on_tool
+    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
+    tau_1 = Ux[_N] - Un[_X] - reach - mz
+    tau_2 = about(c2, s2, _E2, _P2)
+    tau_3 = about(c3, s3, _E3, _P3) + beyond_actuator
+    tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
+    tau = (tau_1, tau_2, tau_3, tau_4, on_tool)
+    if isinstance(A, list):
+        out.tau[0] = tau
+    else:
+        np.stack(tau, axis=-1, out=out.tau)
     if out.pins is None or out.mount is None:
         return
 
     # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from pin 6: the moments about
     # pins 8 and 6 give the force at pin 7 across both directions, and the balance of forces the other two.
-    F_outer, F_top = U[:, 11], U[:, 14]
-    M_outer = about(c2, s2, U[:, 12], U[:, 13])
-    M_top = about(c3, s3, U[:, 15], U[:, 16]) + beyond_actuator
+    M_outer = about(c2, s2, 12, 13)
+    M_top = about(c3, s3, 15, 16) + beyond_actuator
     sine = s3 * c2 - c3 * s2
     with np.errstate(divide="ignore", invalid="ignore"):
-        along_inner, along_lower = -M_top / (g.L5 * sine), -M_outer / (g.L4 * sine)
-        f7 = np.stack([along_inner * c2 + along_lower * c3, along_inner * s2 + along_lower * s3])
-    for pin, force in enumerate((F_outer[:2] + f7, f7, F_top[:2] - f7)):
-        out.pins[pin, :, 0], out.pins[pin, :, 2] = force
+        along_inner, along_lower = np.divide(-M_top, g.L5 * sine), np.divide(-M_outer, g.L4 * sine)
+        f7x, f7z = along_inner * c2 + along_lower * c3, along_inner * s2 + along_lower * s3
+    for pin, x, z in ((0, Ux[11] + f7x, Uz[11] + f7z), (1, f7x, f7z), (2, Ux[14] - f7x, Uz[14] - f7z)):
+        out.pins[pin, :, 0], out.pins[pin, :, 2] = x, z
 
-    rise = ((s2, _E2, c2, _P2), (s3, _E3, c3, _P3), (rho * s3, _RHO, 0.0, _O), (st, _ET, ct, _PT))
-    Mx = U[2, _Z] - U[1, _N] + sum(a * U[2, i] + b * U[2, j] for a, i, b, j in rise) - moment[0]
-    Mn = U[1, _X] - U[0, _Z] + out.tau[:, 1] + out.tau[:, 2]
+    rise = (s2 * Un[_E2] + c2 * Un[_P2]) + (s3 * Un[_E3] + c3 * Un[_P3]) + rho * s3 * Un[_RHO] + (st * Un[_ET] + ct * Un[_PT])
+    Mx = Un[_Z] - Uz[_N] + rise - mx
+    Mn = Uz[_X] - Ux[_Z] + tau_2 + tau_3
     c1, s1 = _cosine_and_sine(q[0])
-    for row, (along, normal) in ((0, (U[0, _O], U[2, _O])), (3, (Mx, Mn))):
-        out.mount[:, row] = -(c1 * along + s1 * normal)
-        out.mount[:, row + 1] = -(s1 * along - c1 * normal)
-    out.mount[:, 2] = -U[1, _O]
-    out.mount[:, 5] = -out.tau[:, 0]
+    mount = out.mount
+    for row, along, normal in ((0, Ux[_O], Un[_O]), (3, Mx, Mn)):
+        mount[:, row] = -(c1 * along + s1 * normal)
+        mount[:, row + 1] = -(s1 * along - c1 * normal)
+    mount[:, 2] = -Uz[_O]
+    mount[:, 5] = -tau_1
 
 
 def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
@@ -405,7 +431,7 @@ def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
     return u - 1.0, u * t
 
 
-def _put_on(U: Array, g: Array, force: tuple[_Value, _Value, _Value]) -> None:
+def _put_on(U: Array, g: Array, force: _Vector) -> None:
     """Take a force at the point g off what the bodies need, in place."""
     for row, along in zip(U, force, strict=True):
         taken = np.multiply.outer(g, along)

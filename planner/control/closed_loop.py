@@ -2,14 +2,26 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from boom_model import BaseMotion, Boom, InputError, gravity_torque, inverse_dynamics, up_on_slope
 from boom_model.arrays import Array, checked
+from boom_model.dynamics.equations_of_motion import mass_matrix_and_bias
 from planner.control.design import Controller, Gains, Goals, design
-from planner.control.plant import Plant, accelerations, equilibrium, friction, spring_torque, torque_limits, twist_under
+from planner.control.plant import (
+    Plant,
+    accelerations,
+    equilibrium,
+    friction,
+    quick_index,
+    spring_torque,
+    torque_limits,
+    twist_under,
+)
 from planner.control.shaping import Impulses
 from planner.motion.vehicle import VehicleCase, base_motion
 from planner.planning import Move
@@ -45,7 +57,7 @@ class Command:
         """Return the command of a move with an input shaper."""
         return Command(move.motions, impulses, move.trajectory.q[-1])
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Duration [s], including the shaper's delay."""
         return sum(motion.duration for motion in self.motions) + float(self.impulses.times[-1])
@@ -128,11 +140,17 @@ class Case:
         """Kind of controller."""
         return self.gains[0].controller
 
+    def place(self, t: ArrayLike) -> tuple[NDArray[np.intp], Array]:
+        """Return the index of the design before times t (...), and the fraction of the way to the next."""
+        last = len(self.gains) - 1
+        along = np.clip(np.asarray(t) / max(self.command.duration, 1e-9), 0.0, 1.0) * last
+        before = np.minimum(along.astype(np.intp), max(last - 1, 0))
+        return before, along - before
+
     def gains_at(self, t: float) -> Gains:
         """Return the gains at time t [s], linearly interpolated between designs."""
-        place = np.clip(t / max(self.command.duration, 1e-9), 0.0, 1.0) * (len(self.gains) - 1)
-        i = min(int(place), max(len(self.gains) - 2, 0))
-        low, high, share = self.gains[i], self.gains[min(i + 1, len(self.gains) - 1)], place - i
+        before, share = self.place(t)
+        low, high = self.gains[before], self.gains[min(int(before) + 1, len(self.gains) - 1)]
         if low is high or share == 0.0:
             return low
         Kp, Kd, Ki, at = ((1.0 - share) * getattr(low, name) + share * getattr(high, name) for name in ("Kp", "Kd", "Ki", "at"))
@@ -224,10 +242,13 @@ def simulate(
     if not cases or not duration > 0.0:
         raise InputError(f"nothing to simulate: {len(cases)} cases for {duration:g} s")
     boom, figures = plant.boom if model is None else model, plant.figures
-    T, B, E = figures.sampling_period, len(cases), list(plant.elastic)
-    stepping = np.array([case.controller is Controller.STEPPER for case in cases])
-    inverse = np.array([case.controller is Controller.COMPUTED_TORQUE for case in cases])
-    if stepping.any() and not E:
+    T, B, E, m = figures.sampling_period, len(cases), plant.columns, len(plant.elastic)
+    steppers, inverse = (
+        quick_index([b for b, case in enumerate(cases) if case.controller is kind])
+        for kind in (Controller.STEPPER, Controller.COMPUTED_TORQUE)
+    )
+    kinds = {case.controller for case in cases}
+    if Controller.STEPPER in kinds and not m:
         raise InputError("a stepper needs an elastic gearbox for its simulation, and no joint is elastic")
     if substeps is None:
         substeps = max(1, int(np.ceil(T / LONGEST_STEP - 1e-9)))
@@ -240,98 +261,96 @@ def simulate(
     row = np.array([commands.index(case.command) for case in cases])
     grounds = _base_arrays(vehicle, half)
     pushes = None if gust is None else gust(half)
-    scheduled = [b for b, case in enumerate(cases) if len(case.gains) > 1]
+    scheduled = quick_index([b for b, case in enumerate(cases) if len(case.gains) > 1])
     Kp, Kd, Ki = (np.stack([getattr(case.gains[0], name) for case in cases]) for name in ("Kp", "Kd", "Ki"))
+    several = [case for case in cases if len(case.gains) > 1]
+    schedule = _schedule(several, half[:: 2 * substeps]) if several else None
     light = np.array([case.controller in (Controller.PD, Controller.PID) for case in cases])[:, None]
 
     resolution = _resolutions(plant)
     keep = np.exp(-2.0 * np.pi * figures.velocity_filter_Hz * T)
     teeth, holding, drag, micro = _stepper_figures(plant)
+    pulled = None  # torques of steppers
+    if Controller.STEPPER in kinds:
+        by_slices = isinstance(steppers, slice) and isinstance(E, slice)
+        pulled = (steppers, E) if by_slices else np.ix_(np.arange(B)[steppers], np.arange(5)[E])
+    field, field_speed = (reference[:, row[steppers]][:, :, E] for reference in (table.q, table.qd))
+    field = np.rint(field / micro) * micro
     alive, ended, lost = np.ones(B, dtype=bool), np.full(B, np.nan), np.full((B, 5), np.nan)
     held, cap = np.zeros((B, 5)), np.full((B, 5), np.inf)
 
     def law(i: int, p: Array, v: Array, total: Array) -> Array:
         """Return torques (B, 5) at half step i for positions p, velocities v, integral action."""
-        q_r, qd_r, qdd_r = table.q[i][row], table.qd[i][row], table.qdd[i][row]
-        w = _matvec(Kp, q_r - p) + _matvec(Kd, qd_r - v) + total
+        w = _matvec(Kp, table.q[i][row] - p) + _matvec(Kd, table.qd[i][row] - v) + total
         u: Array = np.where(light, table.gravity[i][row], table.full[i][row]) + w
-        if inverse.any():
-            a = (qdd_r + w)[inverse]
-            rigid = inverse_dynamics(boom, p[inverse], v[inverse], a, base=tilt, reactions=False, friction=True).tau
-            u[inverse] = rigid + plant.rotor * a + table.gearbox_friction[i][row[inverse]]
+        if Controller.COMPUTED_TORQUE in kinds:
+            a = table.qdd[i][row[inverse]] + w[inverse]
+            M, bias = mass_matrix_and_bias(boom, p[inverse], v[inverse], base=tilt)
+            friction_torque = boom.friction.torque(v[inverse]) + table.gearbox_friction[i][row[inverse]]
+            u[inverse] = _matvec(M, a) + plant.rotor * a + bias + friction_torque
         return u
 
     def torque(i: int, x: Array) -> Array:
         """Return the applied torques (B, 5) at half step i: held, or a stepper's own torque."""
         u = held
         if continuous:
-            q, qd, theta, theta_d = _split(x, len(E))
+            q, qd, theta, theta_d = _split(x, m)
             p, v = _measured(q, theta, E), _measured(qd, theta_d, E)
-            u = np.clip(law(i, p, v, total), -cap, cap)
-        if stepping.any():
+            u = _within(law(i, p, v, total), cap)
+        if pulled is not None:
+            theta, theta_d, most = x[steppers, 10 : 10 + m], x[steppers, 10 + m :], cap[pulled]
             u = u.copy()
-            theta, theta_d = x[stepping, 10 : 10 + len(E)], x[stepping, 10 + len(E) :]
-            goal, speed = table.q[i][row[stepping]][:, E], table.qd[i][row[stepping]][:, E]
-            goal = np.rint(goal / micro) * micro
-            most = cap[stepping][:, E]
-            u[np.ix_(stepping, np.array(E))] = np.clip(
-                most * np.sin(teeth * (goal - theta)) + drag * (speed - theta_d), -most, most
-            )
+            u[pulled] = _within(most * np.sin(teeth * (field[i] - theta)) + drag * (field_speed[i] - theta_d), most)
         return u
 
     def rates(i: int, x: Array) -> Array:
-        x = np.clip(np.nan_to_num(x), -MAX_STATE, MAX_STATE)
-        q, qd, theta, theta_d = _split(x, len(E))
+        x = np.fmin(np.fmax(x, -MAX_STATE), MAX_STATE)
+        q, qd, theta, theta_d = _split(x, m)
         base = None if grounds is None else BaseMotion(*(ground[i] for ground in grounds))
         push = None if pushes is None else pushes[i]
         qdd, theta_dd = accelerations(plant, q, qd, theta, theta_d, torque(i, x), base=base, tip_force=push)
         return np.concatenate([qd, qdd, theta_d, theta_dd], axis=1) * alive[:, None]
 
     theta_0 = table.q[0][row]
-    if stepping.any():  # the rotor lags its command under the load at rest
+    if pulled is not None:  # the rotor lags its command under the load at rest
         pull = gravity_torque(plant.boom, equilibrium(plant, theta_0, tilt), base=tilt)[:, E]
         lag = np.arcsin(np.clip(pull / holding, -1.0, 1.0)) / teeth
-        theta_0[np.ix_(stepping, np.array(E))] -= lag[stepping]
-    x = np.concatenate([equilibrium(plant, theta_0, tilt), np.zeros((B, 5)), theta_0[:, E], np.zeros((B, len(E)))], axis=1)
-    before, v, total = (
-        _quantised(_measured(x[:, :5], x[:, 10 : 10 + len(E)], E), resolution),
-        np.zeros((B, 5)),
-        np.zeros((B, 5)),
-    )
+        theta_0[pulled] -= lag[steppers]
+    x = np.concatenate([equilibrium(plant, theta_0, tilt), np.zeros((B, 5)), theta_0[:, E], np.zeros((B, m))], axis=1)
+    before, v, total = _quantised(_measured(x[:, :5], x[:, 10 : 10 + m], E), resolution), np.zeros((B, 5)), np.zeros((B, 5))
 
-    shape = (count, B, 5)
-    q_s, qd_s, motor_s, torque_s, limit_s = (np.empty(shape) for _ in range(5))
-    spring_s = np.empty((count, B, len(E)))
+    torque_s, limit_s = np.empty((count, B, 5)), np.empty((count, B, 5))
+    states = np.empty((count, *x.shape))
     for k in track(list(range(count))):
         i = 2 * substeps * k
-        q, qd, theta, theta_d = _split(x, len(E))
+        q, qd, theta, theta_d = _split(x, m)
         motor, motor_d = _measured(q, theta, E), _measured(qd, theta_d, E)
         off = np.abs(motor - table.q[i][row])
         fallen = alive & (~np.isfinite(x).all(axis=1) | (off > DIVERGED).any(axis=1))
         ended[fallen], alive[fallen] = k * T, False
-        x[fallen, 5:10], x[fallen, 10 + len(E) :] = 0.0, 0.0
-        if stepping.any():
-            slipped = stepping[:, None] & (teeth * off[:, E] > np.pi) & np.isnan(lost[:, E])
-            lost[:, E] = np.where(slipped, k * T, lost[:, E])
+        x[fallen, 5:10], x[fallen, 10 + m :] = 0.0, 0.0
+        if pulled is not None:
+            slipped = (teeth * off[pulled] > np.pi) & np.isnan(lost[pulled])
+            lost[pulled] = np.where(slipped, k * T, lost[pulled])
         cap = torque_limits(plant, motor_d)
-        for b in scheduled:
-            now = cases[b].gains_at(k * T)
-            Kp[b], Kd[b], Ki[b] = now.Kp, now.Kd, now.Ki
+        if schedule is not None:
+            Kp[scheduled], Kd[scheduled], Ki[scheduled] = schedule(k)
         p = _quantised(motor, resolution)
         v = keep * v + (1.0 - keep) * (p - before) / T
         before = p
         asked = law(i, motor, motor_d, total) if continuous else law(i, p, v, total)
-        held = np.clip(asked, -cap, cap)
-        if stepping.any():
-            asked[stepping] = torque(i, x)[stepping]
+        held = _within(asked, cap)
+        if pulled is not None:
+            asked[steppers] = torque(i, x)[steppers]
         total = total + np.where(np.abs(asked) > cap, 0.0, T * _matvec(Ki, table.q[i][row] - p))
-        q_s[k], qd_s[k], motor_s[k], torque_s[k], limit_s[k] = q, qd, motor, asked, cap
-        spring_s[k] = spring_torque(plant, q, theta - q[:, E])
+        states[k], torque_s[k], limit_s[k] = x, asked, cap
         if k + 1 < count:
             for j in range(substeps):
                 x = _runge_kutta(rates, i + 2 * j, h, x)
     command = np.stack([c(half[:: 2 * substeps])[0] for c in commands], axis=1)[:, row]
-    return Run(half[:: 2 * substeps], command, q_s, qd_s, motor_s, torque_s, limit_s, spring_s, ended, lost)
+    q, qd, theta, _ = _split(states, m)
+    spring = spring_torque(plant, q, theta - q[..., E])
+    return Run(half[:: 2 * substeps], command, q, qd, _measured(q, theta, E), torque_s, limit_s, spring, ended, lost)
 
 
 def _runge_kutta(rates: Callable[[int, Array], Array], i: int, h: float, x: Array) -> Array:
@@ -354,6 +373,25 @@ def _table(plant: Plant, boom: Boom, commands: Sequence[Command], t: Array, tilt
             q = q.copy()
             q[..., E] += twist_under(plant, q, gravity[..., E])
     return _Table(q, qd, qdd, gravity, load + plant.rotor * qdd + gearbox_friction, gearbox_friction)
+
+
+def _schedule(cases: Sequence[Case], t: Array) -> Callable[[int], Array]:
+    """Return a function of the index of t: Kp, Kd and Ki (3, S, 5, 5) of S cases, as `Case.gains_at`."""
+    most = max(len(case.gains) for case in cases)
+    knots = np.empty((3, len(cases), most, 5, 5))
+    for s, case in enumerate(cases):
+        for i in range(most):
+            gains = case.gains[min(i, len(case.gains) - 1)]
+            knots[:, s, i] = gains.Kp, gains.Kd, gains.Ki
+    places, shares = (np.stack(each, axis=1) for each in zip(*(case.place(t) for case in cases), strict=True))
+    each = np.arange(len(cases))
+
+    def at(k: int) -> Array:
+        before, share = places[k], shares[k][:, None, None]
+        gains: Array = (1.0 - share) * knots[:, each, before] + share * knots[:, each, before + 1]
+        return gains
+
+    return at
 
 
 def _base_arrays(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | None:
@@ -393,15 +431,21 @@ def _quantised(p: Array, resolution: Array) -> Array:
     return rounded
 
 
-def _measured(q: Array, theta: Array, E: list[int]) -> Array:
+def _measured(q: Array, theta: Array, E: slice | list[int]) -> Array:
     """Return what the encoders measure: theta at elastic joints, q elsewhere."""
     p = q.copy()
-    p[:, E] = theta
+    p[..., E] = theta
     return p
 
 
 def _split(x: Array, m: int) -> tuple[Array, Array, Array, Array]:
-    return x[:, :5], x[:, 5:10], x[:, 10 : 10 + m], x[:, 10 + m :]
+    return x[..., :5], x[..., 5:10], x[..., 10 : 10 + m], x[..., 10 + m :]
+
+
+def _within(torque: Array, most: Array) -> Array:
+    """Limit a torque to +-most; `np.clip` takes longer on small arrays."""
+    cut: Array = np.minimum(np.maximum(torque, -most), most)
+    return cut
 
 
 def _matvec(K: Array, e: Array) -> Array:

@@ -53,8 +53,6 @@ def linearise(plant: Plant, q: ArrayLike, qd: ArrayLike | None = None, qdd: Arra
 
     by_state = -jacobian(torque, np.concatenate([q, qd]))
     by_state[:, 5:] -= np.diag(boom.friction.viscous)
-    rigid = plant.rotor.copy()
-    rigid[E] = 0.0
     n = 10 + 2 * m
     motor, motor_d = 10 + np.arange(m), 10 + m + np.arange(m)
     forces = np.zeros((5, n))  # forces on the links, derivative with respect to x
@@ -82,7 +80,7 @@ def linearise(plant: Plant, q: ArrayLike, qd: ArrayLike | None = None, qdd: Arra
         A[motor, motor_d] = 1.0
         A[motor_d] = -passed / plant.rotor[E][:, None]
         B[motor_d, E] = 1.0 / plant.rotor[E]
-    M = mass_matrix(boom, q) + np.diag(rigid)
+    M = mass_matrix(boom, q) + plant.rigid_inertia
     A[5:10], B[5:10] = np.linalg.solve(M, forces), np.linalg.solve(M, inputs)
     measured = np.eye(5, n)
     measured[E] = 0.0

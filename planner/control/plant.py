@@ -20,8 +20,9 @@ length L deflects it by F L^3 / (3 E I), which is the angle F L^2 / (3 E I) seen
 Bending out of the arm's plane, torsion of the links and play of the pins are left out.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -33,14 +34,12 @@ from boom_model import (
     InfeasibleError,
     InputError,
     gravity_torque,
-    inverse_dynamics,
     mass_matrix,
 )
 from boom_model.arrays import Array, read_only
 from boom_model.drives.drive import available_torque, reflected_inertia
+from boom_model.dynamics.equations_of_motion import mass_matrix_and_bias
 from planner.control.figures import Figures
-
-_UNITS = np.concatenate([np.zeros((1, 5)), np.eye(5)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +122,48 @@ class Plant:
         """Return the plant with another boom, for example one with another payload."""
         return replace(self, boom=boom)
 
+    @cached_property
+    def columns(self) -> slice | list[int]:
+        """Columns of the elastic joints, as `quick_index`."""
+        return quick_index(self.elastic)
+
+    @cached_property
+    def elastic_rotor(self) -> Array:
+        """(m,) N^2 (J_rotor + J_gear) of the elastic joints [kg m^2]."""
+        return read_only(self.rotor[list(self.elastic)])
+
+    @cached_property
+    def softness(self) -> Array:
+        """(3, m) 1 / K1, 1 / K2, 1 / K3 of the gearboxes [rad/Nm]."""
+        return read_only(1.0 / self.stiffness.T)
+
+    @cached_property
+    def spans(self) -> Array:
+        """(2, m) T1 and T2 - T1, the torques over the first two segments of a gearbox [Nm]."""
+        return read_only([self.breaks[:, 0], self.breaks[:, 1] - self.breaks[:, 0]])
+
+    @cached_property
+    def half_gap(self) -> Array:
+        """(m,) half of the backlash [rad]."""
+        return read_only(0.5 * self.gap)
+
+    @cached_property
+    def stick(self) -> float:
+        """Speed that scales Coulomb friction [rad/s]."""
+        return float(np.radians(self.figures.stick_deg_s))
+
+    @cached_property
+    def rigid_inertia(self) -> Array:
+        """(5, 5) inertia of the drives at joints without elasticity [kg m^2]."""
+        stiff = self.rotor.copy()
+        stiff[list(self.elastic)] = 0.0
+        return read_only(np.diag(stiff))
+
+    @cached_property
+    def has_joint_friction(self) -> bool:
+        """Whether the joints have friction besides that of their drives."""
+        return bool(self.boom.friction.viscous.any() or self.boom.friction.coulomb.any())
+
     @property
     def limits(self) -> tuple[str, ...]:
         """Limitations of this plant, a sentence each."""
@@ -138,6 +179,15 @@ class Plant:
         if rigid:
             sentences.append(f"{', '.join(rigid)}: the gearbox is simulated as rigid and without friction")
         return tuple(sentences)
+
+
+def quick_index(indices: Sequence[int]) -> slice | list[int]:
+    """Return increasing indices as a slice if they are evenly spaced, which NumPy indexes faster."""
+    if not indices:
+        return slice(0)
+    step = indices[1] - indices[0] if len(indices) > 1 else 1
+    evenly = range(indices[0], indices[-1] + 1, step)
+    return slice(evenly.start, evenly.stop, step) if list(evenly) == list(indices) else list(indices)
 
 
 def _is_elastic(drive: Drive) -> bool:
@@ -157,25 +207,32 @@ def compliance(plant: Plant, q: Array) -> tuple[Array, Array]:
             if joint == 1:
                 C[..., column] = plant.boom.geometry.L9 / (3.0 * plant.figures.inner_bending)
             elif joint == 2:
-                free, rho = plant.figures.extension_clear_mm * 1e-3 + q[..., 3], plant.boom.geometry.L7 + q[..., 3]
-                free = np.maximum(free, 0.0)
-                C[..., column] = free**3 / (3.0 * plant.figures.extension_bending * rho**2)
-                C_4[..., column] = C[..., column] * (3.0 / np.maximum(free, 1e-9) - 2.0 / rho)
+                free = np.maximum(plant.figures.extension_clear_mm * 1e-3 + q[..., 3], 0.0)
+                share = free / (plant.boom.geometry.L7 + q[..., 3])
+                bent = share * share / (3.0 * plant.figures.extension_bending)
+                C[..., column] = bent * free
+                C_4[..., column] = bent * (3.0 - 2.0 * share)
     return C, C_4
 
 
 def _segments(plant: Plant, C: Array) -> tuple[tuple[Array, Array, Array], Array, Array]:
     """Return the stiffnesses in series with compliance C (..., m), and the twists between them."""
-    first, second, third = (1.0 / (1.0 / plant.stiffness[:, i] + C) for i in range(3))
+    first, second, third = (1.0 / (softness + C) for softness in plant.softness)
     end_1 = plant.breaks[:, 0] / first
     return (first, second, third), end_1, end_1 + (plant.breaks[:, 1] - plant.breaks[:, 0]) / second
 
 
 def spring_torque(plant: Plant, q: Array, twist: Array, C: Array | None = None) -> Array:
     """Compute T_s (..., m) [Nm] at a twist theta - q (..., m) [rad]."""
-    (k1, k2, k3), end_1, end_2 = _segments(plant, compliance(plant, q)[0] if C is None else C)
-    x = np.maximum(np.abs(twist) - 0.5 * plant.gap, 0.0)
-    size = k1 * np.minimum(x, end_1) + k2 * np.clip(x - end_1, 0.0, end_2 - end_1) + k3 * np.maximum(x - end_2, 0.0)
+    C = compliance(plant, q)[0] if C is None else C
+    soft_1, soft_2, soft_3 = (softness + C for softness in plant.softness)
+    span_1, span_2 = plant.spans
+    on_1 = np.maximum(np.abs(twist) - plant.half_gap, 0.0)
+    on_2 = on_1 - span_1 * soft_1
+    on_3 = on_2 - span_2 * soft_2
+    size = np.minimum(on_1 / soft_1, span_1)
+    size += np.minimum(np.maximum(on_2, 0.0) / soft_2, span_2)
+    size += np.maximum(on_3, 0.0) / soft_3
     torque: Array = np.copysign(size, twist)
     return torque
 
@@ -268,7 +325,7 @@ def friction(plant: Plant, speed: Array, load: Array) -> Array:
         speed: motor speed (..., m) at the joint [rad/s].
         load: T_s (..., m) [Nm].
     """
-    direction = np.tanh(speed / np.radians(plant.figures.stick_deg_s))
+    direction = np.tanh(speed / plant.stick)
     torque: Array = direction * (plant.coulomb + plant.loss * np.maximum(load * np.sign(speed), 0.0))
     return torque
 
@@ -299,28 +356,22 @@ def accelerations(
     Raises:
         InputError: a state is not finite.
     """
-    boom, E = plant.boom, list(plant.elastic)
+    boom, E = plant.boom, plant.columns
     tau: Array = u.copy()
     thetadd = np.zeros_like(theta)
-    if E:
+    if plant.elastic:
         C, C_4 = compliance(plant, q)
         load = spring_torque(plant, q, theta - q[:, E], C)
         passed = load + plant.damping * (theta_d - qd[:, E])
         tau[:, E] = passed
-        tau[:, 3] += 0.5 * (load**2 * C_4).sum(axis=-1)  # a bent extension pushes outwards; this conserves the energy
-        thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.rotor[E]
-    if boom.friction.viscous.any() or boom.friction.coulomb.any():
-        direction = np.tanh(qd / np.radians(plant.figures.stick_deg_s))
+        # A bent extension pushes outwards; this conserves the energy.
+        tau[:, 3] += 0.5 * np.vecdot(load * load, C_4)
+        thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.elastic_rotor
+    if plant.has_joint_friction:
+        direction = np.tanh(qd / plant.stick)
         tau -= boom.friction.viscous * qd + boom.friction.coulomb * direction
-    # One call gives the bias and the columns of M, because a call costs far more than its states.
-    force = None if tip_force is None else np.broadcast_to(tip_force, (len(q), 3))[:, None]
-    terms = inverse_dynamics(
-        boom, q[:, None], qd[:, None], np.broadcast_to(_UNITS, (len(q), 6, 5)), base=base, tip_force=force, reactions=False
-    ).tau
-    bias, M = terms[:, 0], terms[:, 1:] - terms[:, :1]
-    rigid = plant.rotor.copy()
-    rigid[E] = 0.0
-    qdd = np.linalg.solve(M + np.diag(rigid), (tau - bias)[..., None])[..., 0]
+    M, bias = mass_matrix_and_bias(boom, q, qd, base=base, tip_force=tip_force)
+    qdd = np.linalg.solve(M + plant.rigid_inertia, (tau - bias)[..., None])[..., 0]
     return np.asarray(qdd), thetadd
 
 

@@ -7,20 +7,39 @@ writes.
 The poses of the linkage are solved before they are logged. The frame of every body is a child of
 the mount, because a Rerun frame has one parent and so cannot represent a closed loop. The solids
 have the lengths of the model; their thickness is for display only. The colours are Okabe and Ito's.
+
+A name is imported when it is first used: the recording of a move needs neither link design nor the
+closed loop, whose imports take longer than writing it.
 """
 
-from planner.recording.comparison import write_comparison_recording
-from planner.recording.control import write_control_recording
-from planner.recording.link import write_link_recording
-from planner.recording.move import write_recording
-from planner.recording.moves import write_moves_recording
-from planner.recording.reach import write_reach_recording
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "write_comparison_recording",
-    "write_control_recording",
-    "write_link_recording",
-    "write_moves_recording",
-    "write_reach_recording",
-    "write_recording",
-]
+if TYPE_CHECKING:
+    from planner.recording.comparison import write_comparison_recording as write_comparison_recording
+    from planner.recording.control import write_control_recording as write_control_recording
+    from planner.recording.link import write_link_recording as write_link_recording
+    from planner.recording.move import write_recording as write_recording
+    from planner.recording.moves import write_moves_recording as write_moves_recording
+    from planner.recording.reach import write_reach_recording as write_reach_recording
+
+_HOME = {
+    "write_comparison_recording": "planner.recording.comparison",
+    "write_control_recording": "planner.recording.control",
+    "write_link_recording": "planner.recording.link",
+    "write_moves_recording": "planner.recording.moves",
+    "write_reach_recording": "planner.recording.reach",
+    "write_recording": "planner.recording.move",
+}
+
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> object:
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -7,6 +7,7 @@ import numpy as np
 from boom_model import JOINTS, Basis, Drive, tip_deflection
 from boom_model.arrays import Array
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
+from planner.checks.kinds import CheckKind
 from planner.planning import Move
 from planner.recording.palette import (
     GREEN,
@@ -41,7 +42,7 @@ def motor_bundles(move: Move) -> Iterator[Bundle]:
 
 
 def gearbox_bundles(move: Move) -> Iterator[Bundle]:
-    """Yield the absolute torque of each gearbox together with its ratings."""
+    """Yield the absolute torque of each gearbox together with its ratings and the average of the cycle."""
     tau = np.abs(move.loads.tau)
     for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
         if drive is None:
@@ -53,10 +54,15 @@ def gearbox_bundles(move: Move) -> Iterator[Bundle]:
             "start-stop": gear.start_stop_torque,
         }
         known = {name: value for name, value in ratings.items() if value is not None}
+        rows = (row for row in move.report.rows if row.joint == joint and row.kind is CheckKind.GEARBOX_AVERAGE)
+        average = next((row.demand for row in rows), None)
+        if average is not None:
+            known["average of the cycle"] = average
         names = ["torque [Nm]", *(f"{name} [Nm]" for name in known)]
         values = np.stack([tau[:, i], *(np.full(len(tau), value) for value in known.values())], axis=-1)
-        colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, ORANGE, LIMIT_COLOR]
-        yield Bundle(f"plots/gearbox/{joint}", f"{joint}, {gear.name} [Nm]", names, colors[: len(names)], values)
+        kinds = {"rated": PAYLOAD_COLOR, "largest average": ORANGE, "start-stop": LIMIT_COLOR, "average of the cycle": GREEN}
+        colors = [JOINT_COLORS[joint], *(kinds[name] for name in known)]
+        yield Bundle(f"plots/gearbox/{joint}", f"{joint}, {gear.name} [Nm]", names, colors, values)
 
 
 def margin_bundles(move: Move) -> Iterator[Bundle]:

@@ -6,7 +6,7 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
-from boom_model import forward_kinematics
+from boom_model import JOINTS, forward_kinematics
 from boom_model.kinematics.reach import ReachMap
 from planner.planning import Move
 from planner.recording import drive_plots, joint_plots
@@ -14,14 +14,14 @@ from planner.recording.arrows import arrow_scale, log_arrows
 from planner.recording.documents import answer_markdown, assumptions_markdown, checks_markdown
 from planner.recording.layout import eye_of, grid, scene, shown_beside, text
 from planner.recording.legend import legend_view, log_legend
+from planner.recording.margin_bars import log_margins, margin_rows, margins_view
 from planner.recording.plots import Bundle, Plot
 from planner.recording.reach import boundary_sentence, log_boundary
 from planner.recording.scene import ground_level, log_height, log_motion, log_mount, log_solids, log_surroundings
 from planner.recording.states import events_view, lanes, log_events, log_lanes, states_view
-from planner.recording.stream import log_markdown, log_png, log_properties, save
+from planner.recording.stream import log_markdown, log_properties, save
 from planner.recording.torque_ratio import legend, log_tip_path, torque_ratios, worst_ratio
 from planner.recording.torque_speed import log_plane, planes
-from planner.reports.drive_pictures import drive_picture
 
 _TEXTS = ("assumptions", "checks", "report")
 
@@ -49,16 +49,17 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
                               add up to tau
     /plots/motor/<joint>      motor torque, available torque, and available torque less the stepper
                               margin [Nm]
-    /plots/gearbox/<joint>    gearbox torque and its ratings [Nm]
+    /plots/gearbox/<joint>    gearbox torque, its ratings and the average of the cycle [Nm]
     /plots/margin/<joint>     margins of gearbox and motor [%]
     /plots/tip/deflection     tip deflection caused by the drives: its parts and their total [mm]
     /plots/pins               forces at the pins [N]
     /plots/mount/force, moment   of the boom on the mount, along frame 1 [N, Nm]
     .../limits                limits of a plot; constant limits are logged at the two ends of the
                               move only
-    /plane/<joint>            torque-speed plane of the motor, with the operating point over time in
+    /plane/<joint>            torque-speed plane of the motor with the motion, and with the reversed
+                              motion if the checks include it; the operating point over time is
                               .../now
-    /drives                   the page of `drive_picture`, if a joint has a motor
+    /margins/<joint>          margins of all checks of gearbox and motor, as bars [%]
     /states/phase, limit, brakes     what the move is doing, as lanes over time
     /events                          entries where a limit is met, and of the worst stops
     /answer, /checks, /assumptions, /report   documents in Markdown
@@ -97,8 +98,9 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
     drive_tabs: list[rrb.View | rrb.Container] = [grid(name, tab) for name, tab in drives.items() if tab]
     if motors:
         drive_tabs.insert(0, rrb.Vertical(*(plane.view for plane in motors), name="Torque-speed"))
-    if driven:
-        drive_tabs.append(rrb.Spatial2DView(origin="/drives", name="Page"))
+    bars = {joint: rows for joint in JOINTS if (rows := margin_rows(move, joint))}
+    if bars:
+        drive_tabs.append(rrb.Vertical(*(margins_view(joint) for joint in bars), name="All margins"))
     moving: dict[str, Sequence[Plot | Bundle]] = {**joints, "Torque parts": parts, "Pins and mount": forces}
     tabs: list[rrb.View | rrb.Container] = [
         rrb.Vertical(text("answer", "Answer"), states_view(), events_view(), row_shares=[5, 2, 2], name="Answer"),
@@ -144,7 +146,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
             bundle.log(recording, trajectory.t)
         for plane in motors:
             log_plane(recording, trajectory.t, plane)
-        if driven:
-            log_png(recording, "drives", drive_picture(boom, trajectory, loads.tau, report))
+        for joint, rows in bars.items():
+            log_margins(recording, joint, rows)
 
     save(path, f"{boom.name}: {report.profile}, {report.duration:.3f} s", log)

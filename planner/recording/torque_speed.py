@@ -10,8 +10,9 @@ import rerun.blueprint as rrb
 from boom_model import JOINTS, Basis, Drive
 from boom_model.arrays import Array
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
+from planner.checks.kinds import CheckKind
 from planner.planning import Move
-from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, Color
+from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, PURPLE, Color
 from planner.recording.stream import time_column
 
 WIDTH = 1.6
@@ -32,6 +33,8 @@ class Plane:
     """(n,) absolute motor speed [rad/s]"""
     torque: Array
     """(n,) absolute motor torque [Nm]"""
+    reversed: Array | None
+    """(n,) absolute motor torque of the reversed motion [Nm]; None if the checks do not include it."""
     curve_speed: Array
     curve: Array
     basis: Basis
@@ -40,7 +43,8 @@ class Plane:
     @property
     def most(self) -> Array:
         """Speed [rad/s] and torque [Nm] at the far corner of the plane."""
-        return np.array([self.curve_speed[-1], 1.08 * max(self.curve.max(), self.torque.max())])
+        torques = [self.curve, self.torque, *([] if self.reversed is None else [self.reversed])]
+        return np.array([self.curve_speed[-1], 1.08 * max(each.max() for each in torques)])
 
     def points(self, speed: Array, torque: Array) -> Array:
         """Return the coordinates (n, 2) of speeds [rad/s] and torques [Nm] in the plane."""
@@ -67,7 +71,20 @@ def planes(move: Move) -> Iterator[Plane]:
             continue
         basis = Basis.weakest([Basis.ESTIMATED, *(origin.basis for origin in drive.supply_origins)])
         title = f"{joint}, {drive.motor.name}: absolute motor torque [Nm] over speed [rpm]{_supply(drive)}"
-        yield Plane(f"plane/{joint}", title, JOINT_COLORS[joint], speed, np.abs(torque), w, curve, basis)
+        back = None
+        if any(row.joint == joint and row.kind is CheckKind.MOTOR_TORQUE_REVERSED for row in move.report.rows):
+            back = motor_torque(drive, move.loads.tau[:, i], -motion.qd[:, i], motion.qdd[:, i])
+        yield Plane(
+            entity=f"plane/{joint}",
+            title=title,
+            color=JOINT_COLORS[joint],
+            speed=speed,
+            torque=np.abs(torque),
+            reversed=None if back is None else np.abs(back),
+            curve_speed=w,
+            curve=curve,
+            basis=basis,
+        )
 
 
 def _supply(drive: Drive) -> str:
@@ -96,6 +113,8 @@ def log_plane(recording: rr.RecordingStream, t: Array, plane: Plane) -> None:
     with_margin = plane.points(plane.curve_speed, plane.curve / (1.0 + STEPPER_MARGIN))
     line("available", curve, PAYLOAD_COLOR, 1.2, f"available ({plane.basis})")
     line("with_margin", with_margin, LIMIT_COLOR, 1.2, f"with {STEPPER_MARGIN:.0%} margin")
+    if plane.reversed is not None:
+        line("reversed", plane.points(plane.speed, plane.reversed), PURPLE, 0.8, "motion reversed")
     points = plane.points(plane.speed, plane.torque)
     line("motion", points, plane.color, 1.2)
     look = rr.Points2D.from_fields(colors=[plane.color], radii=rr.Radius.ui_points(6.0))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import control
 import numpy as np
 import pytest
 
@@ -52,6 +53,20 @@ def test_lqr_gives_coupled_joints_the_stated_poles_without_gravity():
     by_imaginary_part(rigid_poles(floating, gains), W * np.array([-0.8 - 0.6j, -0.4, -0.8 + 0.6j]), 1e-12)
 
 
+def test_lqr_minimises_the_stated_integral_over_torques():
+    """python-control solves the problem of the docstring with torques as inputs; `design` states it in accelerations."""
+    gains = design(PLANT, Controller.LQR, GOALS, GOAL)
+    linear, M = linearise(Plant.of(BOOM, elastic=False), GOAL), mass_matrix(BOOM, GOAL, drive_inertia=True)
+    a, zeta = 0.4, 0.8
+    weights = (1.0 + a**2 * (4.0 * zeta**2 - 2.0)) * W**4, (a**2 + 4.0 * zeta**2 - 2.0) * W**2, a**2 * W**6
+    system = control.ss(linear.A, linear.B, np.eye(10), 0.0)
+    inverse = np.linalg.inv(M)
+    R = inverse.T @ inverse  # (M M^T)^-1, symmetric to the last bit
+    K, _, _ = control.lqr(system, np.diag(np.repeat(weights, 5)), R, integral_action=np.eye(5, 10))
+    ours = np.hstack([gains.Kp, gains.Kd, gains.Ki])
+    np.testing.assert_allclose(ours, K, rtol=0, atol=1e-10 * np.abs(K).max())
+
+
 def test_pid_and_pd_are_the_stated_polynomials_of_each_joint_alone():
     J = np.diag(mass_matrix(BOOM, GOAL, drive_inertia=True))
     for controller, roots in ((Controller.PD, [-0.8 + 0.6j, -0.8 - 0.6j]), (Controller.PID, [-0.8 + 0.6j, -0.8 - 0.6j, -0.4])):
@@ -86,6 +101,45 @@ def test_a_loop_at_its_gain_margin_is_on_the_verge(controller):
             assert verge[0] < 1.0 < verge[1], (margin, verge)
             found += 1
     assert found >= 5
+
+
+def in_python_control(gains):
+    """The sampled plant and the law from p to -u, as the module's docstring states it."""
+    T, f = PLANT.figures.sampling_period, PLANT.figures.velocity_filter_Hz
+    linear = linearise(PLANT, GOAL)
+    plant = control.sample_system(control.ss(linear.A, linear.B, linear.measured, 0.0), T, method="zoh")
+    a, z = np.exp(-2.0 * np.pi * f * T), control.tf([1.0, 0.0], [1.0], T)
+    v, total = (1.0 - a) / T * (z - 1.0) / (z - a), T / (z - 1.0)
+
+    def law(x):
+        """C(x) (5, 5) at a point x of the z-plane."""
+        return gains.Kp + gains.Kd * v(x) + gains.Ki * total(x)
+
+    return plant, law
+
+
+@pytest.mark.parametrize("controller", [Controller.PD, Controller.PID, Controller.LQR])
+def test_margins_and_responses_equal_python_control(controller):
+    gains = design(PLANT, controller, Goals(), GOAL)
+    loop = analyse(PLANT, gains, GOAL)
+    plant, law = in_python_control(gains)
+    x = np.exp(2j * np.pi * loop.frequencies * PLANT.figures.sampling_period)
+    L = np.stack([law(at) @ plant(at) for at in x[::100]])
+    for margin in loop.margins:
+        i, o = margin.joint, [j for j in range(5) if j != margin.joint]
+        alone = np.array([m[i, i] - m[i, o] @ np.linalg.solve(np.eye(4) + m[np.ix_(o, o)], m[o, i]) for m in L])
+        np.testing.assert_allclose(loop.response[::100, i], alone, rtol=1e-9)
+        theirs = control.FRD(loop.response[:, i], 2.0 * np.pi * loop.frequencies, smooth=True)
+        gain, phase, _, _, crossing, _ = control.stability_margins(theirs, returnall=True)
+        nearest = np.abs(phase).argmin()
+        np.testing.assert_allclose(margin.phase_deg, phase[nearest], rtol=2e-8)
+        np.testing.assert_allclose(margin.crossover_Hz, crossing[nearest] / (2.0 * np.pi), rtol=5e-9)
+        for mine, decibels in ((margin.gain_dB, 1.0), (margin.less_gain_dB, -1.0)):
+            found = 20.0 * np.log10(gain)
+            found = found[found * decibels > 0.0]
+            assert (mine is None) == (found.size == 0)
+            if mine is not None:
+                np.testing.assert_allclose(mine, found[np.abs(found).argmin()], rtol=1e-10)
 
 
 def test_a_phase_margin_is_the_loops_distance_from_minus_one():

@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 import planner
 from boom_model import ActuatorHorizontal, Boom, InputError, body_transforms, forward_kinematics, inverse_kinematics, reach_map
 from boom_model.arrays import Array
-from boom_model.drives.drive import STEPPER_MARGIN, available_torque
+from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
 from boom_model.drives.linear_actuator import LinearActuator, LinearDrive
 from boom_model.keep_out import Box, KeepOut
 from boom_model.kinematics.frames import frame_transforms
@@ -26,7 +26,7 @@ from planner.planning import Move, check_motion, plan
 from planner.profile_table import profile_markdown, profile_moves, profile_rows
 from planner.recording import write_moves_recording, write_recording
 from planner.recording.drive_plots import margin
-from planner.recording.palette import LIGHT
+from planner.recording.palette import GREEN, GREY, LIGHT, ORANGE, VERMILION
 from planner.recording.reach import boundary
 from planner.recording.torque_ratio import torque_ratios, worst_ratio
 from planner.reports.report import cells
@@ -255,6 +255,10 @@ def test_operating_point_moves_in_the_torque_speed_plane(panel: Read, move: Move
         curve = np.array(panel.static(f"{entity}/{name}", "LineStrips2D:strips")[0])
         given = available_torque(drive, curve[:, 0] / tick("rpm", 0) * np.pi / 30.0) / share
         np.testing.assert_allclose((1.0 - curve[:, 1]) / tick("Nm", 1), given, rtol=0, atol=1e-4)
+    back = np.array(panel.static(f"{entity}/reversed", "LineStrips2D:strips")[0])
+    np.testing.assert_allclose(back[:, 0], now[:, 0], rtol=0, atol=1e-6)
+    reversed_torque = motor_torque(drive, move.loads.tau[:, i], -move.trajectory.qd[:, i], move.trajectory.qdd[:, i])
+    np.testing.assert_allclose((1.0 - back[:, 1]) / tick("Nm", 1), np.abs(reversed_torque), rtol=0, atol=1e-5)
     title = panel.titles()[entity]
     assert title == f"{joint}, MST342C02: absolute motor torque [Nm] over speed [rpm]; 80 V, parallel"
     assert panel.static(f"{entity}/available/name", "Points2D:labels") == ["available (assumed)"]
@@ -272,6 +276,28 @@ def test_least_margin_over_time_is_the_reports(panel: Read, move: Move, joint: s
     np.testing.assert_allclose(peak, 100.0 * np.minimum(BOOM.drives[1].gearbox.peak_torque / torque - 1.0, 3.0), rtol=1e-9)
     assert values[0, names.index("gearbox, required [%]")] == 0.0
     assert values[0, names.index("motor, required [%]")] == 50.0
+
+
+@pytest.mark.parametrize("joint", ["inner", "lower"])
+def test_a_bar_for_every_margin_of_the_report(panel: Read, move: Move, joint: str):
+    rows = [row for row in move.report.rows if row.joint == joint and row.check.startswith(("gearbox", "motor"))]
+    rows = [row for row in rows if row.margin is not None or row.verdict == "NOT CHECKABLE"]
+    entity, colors = f"/margins/{joint}", {"PASS": GREEN, "WARN": ORANGE, "FAIL": VERMILION, "INFO": GREY}
+    heights = np.array(panel.static(f"{entity}/check", "Points2D:positions"))[:, 1]
+    assert panel.static(f"{entity}/check", "Points2D:labels") == [row.check for row in rows]
+    shown = [cells(row)[4] if row.margin is not None else "NOT CHECKABLE" for row in rows]
+    assert panel.static(f"{entity}/margin", "Points2D:labels") == shown
+    known = [row for row in rows if row.margin is not None]
+    assert panel.static(f"{entity}/bars", "LineStrips2D:colors") == [packed(colors[row.verdict]) for row in known]
+    bars = np.array(panel.static(f"{entity}/bars", "LineStrips2D:strips"))
+    caps = np.copysign(panel.static(f"{entity}/bars", "LineStrips2D:radii"), bars[:, 1, 0])  # a line has round caps
+    ends = bars[:, 1, 0] + caps
+    np.testing.assert_allclose(bars[:, 0, 0], caps, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(ends, np.clip([row.margin for row in known], -1.0, 3.0), rtol=0, atol=1e-6)
+    below = bars[:, 0, 1] - heights[[row.margin is not None for row in rows]]
+    np.testing.assert_allclose(below, below[0], rtol=0, atol=1e-6)
+    required = np.array(panel.static(f"{entity}/required", "LineStrips2D:strips"))
+    assert required[:, 0, 0].tolist() == [row.required_margin for row in known if row.required_margin]
 
 
 def test_margin_of_nothing_asked_is_cut_off():
@@ -303,7 +329,7 @@ def test_assumptions_are_a_page(panel: Read, move: Move):
 
 
 def test_every_view_says_its_unit(panel: Read):
-    texts = {"/answer", "/states", "/events", "/checks", "/assumptions", "/report", "/drives"}
+    texts = {"/answer", "/states", "/events", "/checks", "/assumptions", "/report"}
     for origin, title in panel.titles().items():
         assert origin in texts or re.search(r"\[(m|m/s|m/s\^2|deg|deg/s|deg/s\^2|N|Nm|mm|%|-)\]", title), (origin, title)
 

@@ -1,6 +1,7 @@
 """Mass matrix, bias, energies and forward dynamics against MuJoCo, Pinocchio, each other and differences."""
 
 from collections.abc import Callable
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from boom_model.dynamics.equations_of_motion import (
     gravity_torque,
     kinetic_energy,
     mass_matrix,
+    mass_matrix_and_bias,
     potential_energy,
     velocity_torque,
 )
@@ -98,6 +100,23 @@ def test_inverse_dynamics_undoes_forward_dynamics(boom):
     options = {"base": random_base(np.random.default_rng(8), 200), "friction": True, "drive_inertia": True}
     qdd = forward_dynamics(boom, q, qd, 50.0 * tau, **options)
     assert (errors(inverse_dynamics(boom, q, qd, qdd, **options).tau, 50.0 * tau) < 4e-13).all()
+
+
+@pytest.mark.parametrize("surroundings", BASES)
+def test_closed_form_equals_newton_euler_and_pinocchio(boom, surroundings):
+    q, qd, qdd = states(boom, 1000, 20)
+    options = {"base": BASES[surroundings](), "tip_force": np.random.default_rng(21).normal(scale=50.0, size=(1000, 3))}
+    M, bias = mass_matrix_and_bias(boom, q, qd, **options)
+    tau = np.einsum("nij,nj->ni", M, qdd) + bias
+    assert (errors(tau, inverse_dynamics(boom, q, qd, qdd, **options).tau) < 5e-15).all()
+    assert (errors(tau[:200], oracle_torque(boom, 200, q, qd, qdd, **options)) < 4e-14).all()
+
+
+def oracle_torque(boom: Boom, count: int, *motion: Array, base: BaseMotion | None, tip_force: Array) -> Array:
+    if base is not None and base.velocity.ndim > 1:
+        base = BaseMotion(*(getattr(base, field.name)[:count] for field in fields(base)))
+    few = [x[:count] for x in motion]
+    return pinocchio_inverse_dynamics(boom, *few, base=base, tip_force=tip_force[:count]).tau
 
 
 def test_velocity_torque_equals_pinocchio(boom):
@@ -185,6 +204,8 @@ def test_batches_are_their_states_one_by_one(boom, shape):
     q, qd, tau = states(boom, int(np.prod(shape)), 19)
     for last, function in (
         ((5, 5), lambda q, *_: mass_matrix(boom, q)),
+        ((5, 5), lambda q, qd, _: mass_matrix_and_bias(boom, q, qd)[0]),
+        ((5,), lambda q, qd, _: mass_matrix_and_bias(boom, q, qd)[1]),
         ((5,), lambda q, qd, _: velocity_torque(boom, q, qd)),
         ((5,), lambda q, *_: gravity_torque(boom, q)),
         ((5,), lambda q, qd, tau: forward_dynamics(boom, q, qd, tau)),
