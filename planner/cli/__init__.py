@@ -9,7 +9,7 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, files, kinematics, link, moves, view
+from planner.cli import control, data, drives, files, kinematics, link, moves, study, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -85,6 +85,7 @@ for _command in (
     kinematics.reach,
     drives.mission,
     drives.size,
+    study.study,
     control.control,
     link.link,
     files.export,
