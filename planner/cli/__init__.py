@@ -12,7 +12,7 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, files, kinematics, link, moves, require, view
+from planner.cli import control, data, drives, files, kinematics, link, moves, require, study, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -94,6 +94,7 @@ for _command in (
     drives.mission,
     drives.size,
     require.require,
+    study.study,
     control.control,
     link.link,
     files.export,
