@@ -22,11 +22,7 @@ def covariance_of_quality(quality: NDArray[np.int_], source: str, *, known: bool
     std = np.array([STD_OF_QUALITY.get(int(each), STD_OF_QUALITY[1]) for each in quality])
     spread = std[:, None] * [1.0, 1.0, _UP]
     figures = ", ".join(f"{each:g} m" for each in sorted(set(std)))
-    of = (
-        "from the quality of the fix"
-        if known
-        else "as of a single fix, for want of std_east_m, std_north_m, std_up_m or quality"
-    )
+    of = "from the quality of the fix" if known else "as of a single fix, no std_east_m, std_north_m, std_up_m, no quality"
     return spread[:, :, None] ** 2 * np.eye(3), (f"{source}: assumed standard deviation of the position {figures}, {of}",)
 
 

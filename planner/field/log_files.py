@@ -18,7 +18,7 @@ from planner.field.assumed import (
     heading_of_track,
     track_note,
 )
-from planner.field.earth import datum_note, ecef_from, geodetic_of
+from planner.field.earth import datum_note, ecef_from, ecef_of, geodetic_of
 from planner.field.nmea import read_nmea
 from planner.field.tables import TIME_COLUMNS, LogTable, read_table
 from planner.field.vehicle_log import LATITUDE, VehicleLog
@@ -83,7 +83,7 @@ def read_vehicle_log(path: str | Path, epsg: int | None = None, longest_gap: flo
     t, clock = table.times()
     table, t, doubled = _without_doubles(table, t)
     latitude, longitude, height, placed = _position(table, epsg)
-    angles, angle_covariance, turned = _attitude(table, t, latitude, longitude, height)
+    angles, angle_covariance, turned = _attitude(table, len(t), ecef_of(latitude, longitude, height))
     covariance, assumed = _position_covariance(table)
     return VehicleLog.of(
         t,
@@ -205,8 +205,8 @@ def _position(table: LogTable, epsg: int | None) -> tuple[Array, Array, Array, t
     given = [name for name, there in forms.items() if there]
     if len(given) != 1:
         raise InputError(
-            f"{table.path}: it has {' and '.join(given) or 'no position'}; it needs one of latitude_deg, longitude_deg, height_m; "
-            "easting_m, northing_m, height_m; and x_m, y_m, z_m (EPSG:4978)"
+            f"{table.path}: it has {' and '.join(given) or 'no position'}; it needs one of "
+            "latitude_deg, longitude_deg, height_m; easting_m, northing_m, height_m; and x_m, y_m, z_m (EPSG:4978)"
         )
     if given[0] == "x, y, z":
         ecef = np.stack([table.numbers(name) for name in ("x_m", "y_m", "z_m")], axis=-1)
@@ -235,7 +235,7 @@ def _position(table: LogTable, epsg: int | None) -> tuple[Array, Array, Array, t
         raise InputError(f"{table.where(k)}: latitude is {degrees[0][k]:g} deg; latitude and longitude are swapped")
     if table.has("latitude_deg") and (np.abs(degrees[0]) < np.pi / 2).all() and (np.abs(degrees[1]) < np.pi).all():
         raise InputError(
-            f"{table.where(0)}: {degrees[0][0]:g}, {degrees[1][0]:g} deg is in the Gulf of Guinea; the columns look like radians"
+            f"{table.where(0)}: {degrees[0][0]:g}, {degrees[1][0]:g} deg is in the Gulf of Guinea; it looks like radians"
         )
     return latitude, longitude, height, ()
 
@@ -276,12 +276,10 @@ def _angle(table: LogTable, name: str) -> Array:
     return np.radians(table.numbers(f"{name}_deg")) if table.has(f"{name}_deg") else table.numbers(f"{name}_rad")
 
 
-def _attitude(
-    table: LogTable, t: Array, latitude: Array, longitude: Array, height: Array
-) -> tuple[Array, Array, tuple[str, ...]]:
+def _attitude(table: LogTable, n: int, ecef: Array) -> tuple[Array, Array, tuple[str, ...]]:
     """Return roll, pitch, heading (n, 3) [rad], their covariance (n, 3, 3), and what of them is assumed."""
     given = {name: table.has(f"{name}_deg") or table.has(f"{name}_rad") for name in ANGLES[2:]}
-    angles, std = np.zeros((len(t), 3)), np.zeros((len(t), 3))
+    angles, std = np.zeros((n, 3)), np.zeros((n, 3))
     notes, assumed = [], []
     for i, name in enumerate(ANGLES[2:]):
         if given[name]:
@@ -301,7 +299,7 @@ def _attitude(
     if assumed:
         notes.append(f"{table.path}: assumed standard deviations: {', '.join(assumed)}")
     if not given["heading"]:
-        angles[:, 2] = heading_of_track(ecef_from(4979, np.degrees(longitude), np.degrees(latitude), height), table.path)
+        angles[:, 2] = heading_of_track(ecef, table.path)
         std[:, 2] = TRACK_STD
         notes.append(track_note(table.path))
     covariance = std[:, :, None] ** 2 * np.eye(3)

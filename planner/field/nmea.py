@@ -182,13 +182,14 @@ def _log(path: str, read: _Sentences, longest_gap: float | None) -> VehicleLog:
 
 def _attitude(path: str, read: _Sentences, t: Array) -> tuple[Array, Array, tuple[str, ...]]:
     """Return roll, pitch, heading (n, 3) [rad] at the fixes, NaN where there is no heading, their deviations, and notes."""
+    notes: tuple[str, ...] = ()
     level = f"{path}: no roll and pitch; assumed level, with a standard deviation of {np.degrees(NO_TILT_STD):g} deg"
     angles = np.zeros((len(t), 3))
     if read.attitudes:
         at = np.array([each[0].timestamp() for each in read.attitudes])
         measured = np.unwrap(np.radians([each[1:] for each in read.attitudes]), axis=0)
-        found, spread, notes = _at_fixes(path, t, at, measured), np.array([TILT_STD, TILT_STD, HEADING_STD]), ()
-        angles[:] = found
+        angles[:] = _at_fixes(path, t, at, measured)
+        spread = np.array([TILT_STD, TILT_STD, HEADING_STD])
     elif read.headings:
         at = np.array([each[0].timestamp() for each in read.headings])
         heading = np.unwrap(np.radians([each[1] for each in read.headings]))
@@ -204,9 +205,10 @@ def _attitude(path: str, read: _Sentences, t: Array) -> tuple[Array, Array, tupl
 def _at_fixes(path: str, t: Array, at: Array, angles: Array) -> Array:
     order = np.argsort(at, kind="stable")
     at, angles = at[order], angles[order]
-    nearest = np.abs(at[np.clip(np.searchsorted(at, t), 1, max(len(at) - 1, 1)) - 1] - t) if len(at) > 1 else np.abs(at[0] - t)
-    if (nearest > _NEAR).any():
-        k = int(np.argmax(nearest > _NEAR))
+    after = np.clip(np.searchsorted(at, t), 0, len(at) - 1)
+    away = np.minimum(np.abs(at[after] - t), np.abs(at[np.maximum(after - 1, 0)] - t))
+    if (away > _NEAR).any():
+        k = int(np.argmax(away > _NEAR))
         raise InputError(f"{path}: the fix at {datetime.fromtimestamp(t[k], UTC):%H:%M:%S} has no attitude within {_NEAR:g} s")
     return np.stack([np.interp(t, at, column) for column in angles.T], axis=-1)
 

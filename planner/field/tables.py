@@ -107,7 +107,7 @@ class LogTable:
             raise InputError(f"{self.where(row)}: utc is {shown(cell)}; it must be a time as 2026-07-01T09:00:00.25Z") from None
         if instant.tzinfo is None:
             raise InputError(
-                f"{self.where(row)}: utc is {shown(cell)}, without a zone; write Z for UTC, or the offset of local time as -06:00"
+                f"{self.where(row)}: utc is {shown(cell)}, without a zone; write Z for UTC, or the offset as -06:00"
             )
         return (instant - datetime(1970, 1, 1, tzinfo=UTC)).total_seconds()
 
@@ -137,7 +137,8 @@ def read_table(path: str | Path, known: Iterable[str]) -> tuple[LogTable, tuple[
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text, at byte {error.start}") from None
-    rows, lines = [], []
+    rows: list[tuple[str, ...]] = []
+    lines: list[int] = []
     reader = csv.reader(text.splitlines(), strict=True)
     try:
         for row in reader:
@@ -155,9 +156,9 @@ def read_table(path: str | Path, known: Iterable[str]) -> tuple[LogTable, tuple[
     if len(set(header)) < len(header):
         twice = next(name for name in header if header.count(name) > 1)
         raise InputError(f"{path}, line {lines[0]}: column {shown(twice)} is there twice")
-    for row, line in zip(rows[1:], lines[1:], strict=True):
-        if len(row) != len(header):
-            raise InputError(f"{path}, line {line}: {len(row)} cells; the header has {len(header)}")
+    for cells, line in zip(rows[1:], lines[1:], strict=True):
+        if len(cells) != len(header):
+            raise InputError(f"{path}, line {line}: {len(cells)} cells; the header has {len(header)}")
     expected = list(known)
     strange = [name for name in header if name not in expected]
     for name in strange:
