@@ -9,7 +9,7 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, files, kinematics, link, moves, view
+from planner.cli import control, data, drives, field, files, kinematics, link, moves, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -86,6 +86,8 @@ for _command in (
     drives.mission,
     drives.size,
     control.control,
+    field.geotag,
+    field.plots,
     link.link,
     files.export,
     files.export_model,

@@ -52,7 +52,8 @@ def transform(source: int, target: int, x: ArrayLike, y: ArrayLike, z: ArrayLike
     Raises:
         InputError: a code is not known, or a point cannot be transformed.
     """
-    moved = np.stack(np.broadcast_arrays(*_transformer(source, target).transform(x, y, z)), axis=-1)
+    given = np.broadcast_arrays(*(np.asarray(each, dtype=float) for each in (x, y, z)))
+    moved = np.stack(_transformer(source, target).transform(*given), axis=-1)
     if not np.isfinite(moved).all():
         raise InputError(f"a point cannot be transformed from EPSG {source} to EPSG {target}")
     return np.asarray(moved, dtype=float)

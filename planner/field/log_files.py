@@ -230,9 +230,10 @@ def _position(table: LogTable, epsg: int | None) -> tuple[Array, Array, Array, t
     latitude, longitude = _angle(table, "latitude"), _angle(table, "longitude")
     degrees = np.degrees(latitude), np.degrees(longitude)
     beyond = np.abs(degrees[0]) > LATITUDE.high
-    if beyond.any() and (np.abs(degrees[1]) <= LATITUDE.high).all():
+    if beyond.any():
         k = int(np.argmax(beyond))
-        raise InputError(f"{table.where(k)}: latitude is {degrees[0][k]:g} deg; latitude and longitude are swapped")
+        swapped = "; latitude and longitude are swapped" if abs(degrees[1][k]) <= LATITUDE.high else ""
+        raise InputError(f"{table.where(k)}: latitude is {degrees[0][k]:g} deg; it must be between -90 and 90 deg{swapped}")
     if table.has("latitude_deg") and (np.abs(degrees[0]) < np.pi / 2).all() and (np.abs(degrees[1]) < np.pi).all():
         raise InputError(
             f"{table.where(0)}: {degrees[0][0]:g}, {degrees[1][0]:g} deg is in the Gulf of Guinea; it looks like radians"

@@ -6,6 +6,7 @@ What is written is in WGS 84 (EPSG:4326), longitude first, as QGIS reads it.
 import csv
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,7 +15,7 @@ from pydantic import Field
 
 from boom_model import InputError
 from boom_model.arrays import Array
-from boom_model.plausible import OFFSET, Range
+from boom_model.plausible import Range
 from boom_model.toml_file import Table, read_toml
 from planner.field.earth import GEOGRAPHIC, datum_note, ecef_from, geodetic_of, reference_system
 from planner.field.extra import library
@@ -25,7 +26,6 @@ FORMS = (".geojson", ".json", ".shp", ".csv")
 """Endings of the files that a map is written to."""
 _NAMES = ("plot", "name", "plot_id", "plotid", "id", "plot_name")
 _DECIMALS = 10  # of a degree: 0.01 mm
-_COUNT = Range(1, 10_000, "")
 _PLOT_SIDE = Range(0.05, 1e3, "m")
 _ALLEY = Range(0.0, 100.0, "m")
 _MOST = 100_000
@@ -177,7 +177,7 @@ def _read_shapefile(path: str | Path, epsg: int | None) -> PlotMap:
                 if each.shape.shapeType not in (shapefile.POLYGON, shapefile.POLYGONZ, shapefile.POLYGONM):
                     raise InputError(f"{path}: shape {k + 1} is no polygon")
                 starts = [*each.shape.parts, len(each.shape.points)]
-                rings = [[list(p[:2]) for p in each.shape.points[a:b]] for a, b in zip(starts[:-1], starts[1:], strict=True)]
+                rings = [[list(p[:2]) for p in each.shape.points[a:b]] for a, b in pairwise(starts)]
                 found.append((each.record.as_dict(), _rings(f"{path}: shape {k + 1}", rings)))
     except InputError:
         raise

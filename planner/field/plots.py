@@ -118,7 +118,7 @@ class PlotMap:
                 raise InputError(f"{self.source}: plot {name} is no simple polygon: {why.lower()}")
             if polygon.area < _SMALLEST_AREA:
                 raise InputError(f"{self.source}: plot {name} has an area of {polygon.area:.2g} m^2")
-        for i, j in self.tree.query(self.polygons, predicate="overlaps").T:
+        for i, j in self.tree.query(self.polygons, predicate="intersects").T:
             shared = self.polygons[i].intersection(self.polygons[j]).area
             if i < j and shared > 0.1 * min(self.polygons[i].area, self.polygons[j].area):
                 raise InputError(f"{self.source}: plots {self.names[i]} and {self.names[j]} overlap by {shared:.2g} m^2")
