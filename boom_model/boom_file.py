@@ -128,6 +128,24 @@ class _GeometryTable(Table):
     L6_m: _Offset
     L7_m: Annotated[float, LENGTH]
     L8_m: Annotated[float, WIDTH]
+    L5_m: Annotated[float, LENGTH] | None = None
+    """None: equal to L3."""
+    L9_m: Annotated[float, LENGTH] | None = None
+    """None: equal to L4."""
+
+    @property
+    def geometry(self) -> Geometry:
+        return Geometry(
+            L1=self.L1_m,
+            L2=self.L2_m,
+            L3=self.L3_m,
+            L4=self.L4_m,
+            L6=self.L6_m,
+            L7=self.L7_m,
+            L8=self.L8_m,
+            upper_less_lower=0.0 if self.L5_m is None else self.L5_m - self.L3_m,
+            inner_less_outer=0.0 if self.L9_m is None else self.L9_m - self.L4_m,
+        )
 
 
 class _BodyTable(Table):
@@ -288,7 +306,6 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
     table = read_toml(file, _BoomTable)
     known = Catalogue.load().with_file(catalogue)
     joints = [getattr(table.joints, joint) for joint in JOINTS]
-    g = table.geometry
     limits = _limits(joints, table.linkage)
     poses = {name: _pose(pose) for name, pose in table.poses.items()}
     for name, q in poses.items():
@@ -297,7 +314,7 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
     return Boom(
         name=table.name,
         gravity=table.gravity_m_s2,
-        geometry=Geometry(L1=g.L1_m, L2=g.L2_m, L3=g.L3_m, L4=g.L4_m, L6=g.L6_m, L7=g.L7_m, L8=g.L8_m),
+        geometry=table.geometry.geometry,
         bodies=MappingProxyType({name: _body(getattr(table.bodies, name)) for name in ("base", *MOVING_BODIES)}),
         payload=_body(table.payload),
         friction=_friction(joints),
