@@ -54,12 +54,22 @@ LIMIT_TOLERANCE = 1e-9
 """Tolerance [rad or m] of every comparison with a position limit, for rounding."""
 
 
-_LENGTHS = {"L1": OFFSET, "L2": OFFSET, "L3": LENGTH, "L4": LENGTH, "L6": OFFSET, "L7": LENGTH, "L8": WIDTH}
+_LENGTHS = {
+    "L1": OFFSET,
+    "L2": OFFSET,
+    "L3": LENGTH,
+    "L4": LENGTH,
+    "L6": OFFSET,
+    "L7": LENGTH,
+    "L8": WIDTH,
+    "L5": LENGTH,
+    "L9": LENGTH,
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Lengths [m] (thesis, figure 2-1). L5 = L3 and L9 = L4, as the linkage is a parallelogram."""
+    """Lengths [m] (thesis, figure 2-1). The linkage is a parallelogram where L5 = L3 and L9 = L4."""
 
     L1: float
     L2: float
@@ -68,6 +78,10 @@ class Geometry:
     L6: float
     L7: float
     L8: float
+    upper_less_lower: float = 0.0
+    """L5 - L3, 0 in a parallelogram."""
+    inner_less_outer: float = 0.0
+    """L9 - L4, 0 in a parallelogram."""
 
     def __post_init__(self) -> None:
         for name, quantity in _LENGTHS.items():
@@ -75,13 +89,30 @@ class Geometry:
 
     @property
     def L5(self) -> float:
-        """Side of the parallelogram on the upper link, equal to L3 [m]."""
-        return self.L3
+        """Side of the linkage on the upper link [m]."""
+        return self.L3 + self.upper_less_lower
 
     @property
     def L9(self) -> float:
-        """Side of the parallelogram on the inner link, equal to L4 [m]."""
-        return self.L4
+        """Side of the linkage on the inner link [m]."""
+        return self.L4 + self.inner_less_outer
+
+    @property
+    def is_parallelogram(self) -> bool:
+        """Whether opposite links of the linkage are equal."""
+        return self.upper_less_lower == 0.0 and self.inner_less_outer == 0.0
+
+    def require_parallelogram(self, what: str) -> None:
+        """Refuse a general four-bar linkage.
+
+        Raises:
+            InputError: opposite links differ; the message says what needs equal ones.
+        """
+        if not self.is_parallelogram:
+            raise InputError(
+                f"{what} needs a parallelogram; this boom has L5 - L3 = {self.upper_less_lower * 1e3:.3g} mm and "
+                f"L9 - L4 = {self.inner_less_outer * 1e3:.3g} mm. Leave L5_m and L9_m out of its file for equal links"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,14 +40,13 @@ from boom_model.plausible import (
     VOLTAGE,
     WIDTH,
 )
-from boom_model.provenance import Basis, Origin, Sourced
+from boom_model.provenance import Basis, BasisName, Origin, Sourced
 from boom_model.toml_file import Table, read_toml, validated
 from boom_model.words import nearest_name
 
 BOOM_FILE = Path(str(files("boom_model") / "data" / "third_generation.toml"))
 
 V = TypeVar("V")
-BasisName = Literal["printed", "estimated", "assumed"]
 _Mass = Annotated[float, MASS]
 _Offset = Annotated[float, OFFSET]
 Triple = Annotated[list[_Offset], Field(min_length=3, max_length=3)]
@@ -133,6 +132,24 @@ class _GeometryTable(Table):
     L6_m: _Offset
     L7_m: Annotated[float, LENGTH]
     L8_m: Annotated[float, WIDTH]
+    L5_m: Annotated[float, LENGTH] | None = None
+    """None: equal to L3."""
+    L9_m: Annotated[float, LENGTH] | None = None
+    """None: equal to L4."""
+
+    @property
+    def geometry(self) -> Geometry:
+        return Geometry(
+            L1=self.L1_m,
+            L2=self.L2_m,
+            L3=self.L3_m,
+            L4=self.L4_m,
+            L6=self.L6_m,
+            L7=self.L7_m,
+            L8=self.L8_m,
+            upper_less_lower=0.0 if self.L5_m is None else self.L5_m - self.L3_m,
+            inner_less_outer=0.0 if self.L9_m is None else self.L9_m - self.L4_m,
+        )
 
 
 class _BodyTable(Table):
@@ -296,7 +313,7 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
 
 
 def boom_of(data: dict[str, Any], known: Catalogue, name: str) -> Boom:
-    """The boom of a boom's file that is read already, as nested dictionaries.
+    """Return the boom of a boom's file that is read already, as nested dictionaries.
 
     Args:
         data: what the file holds.
@@ -310,9 +327,8 @@ def boom_of(data: dict[str, Any], known: Catalogue, name: str) -> Boom:
 
 
 def _boom(file: str, table: _BoomTable, known: Catalogue, searched: str) -> Boom:
-    """The boom of a table; `searched` is where the drives were looked for, in messages."""
+    """Return the boom of a table; messages name `searched` as the place of the drives."""
     joints = [getattr(table.joints, joint) for joint in JOINTS]
-    g = table.geometry
     limits = _limits(joints, table.linkage)
     poses = {name: _pose(pose) for name, pose in table.poses.items()}
     for name, q in poses.items():
@@ -321,7 +337,7 @@ def _boom(file: str, table: _BoomTable, known: Catalogue, searched: str) -> Boom
     return Boom(
         name=table.name,
         gravity=table.gravity_m_s2,
-        geometry=Geometry(L1=g.L1_m, L2=g.L2_m, L3=g.L3_m, L4=g.L4_m, L6=g.L6_m, L7=g.L7_m, L8=g.L8_m),
+        geometry=table.geometry.geometry,
         bodies=MappingProxyType({name: _body(getattr(table.bodies, name)) for name in ("base", *MOVING_BODIES)}),
         payload=_body(table.payload),
         friction=_friction(joints),

@@ -34,7 +34,7 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
 
 
 def parse_toml(path: Path) -> dict[str, Any]:
-    """The file as nested dictionaries, held to no schema.
+    """Return the file as nested dictionaries, held to no schema.
 
     Raises:
         InputError: the file cannot be read, or is not TOML.

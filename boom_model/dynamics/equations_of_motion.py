@@ -1,7 +1,7 @@
 """Equations of motion, M(q) qdd + C(q, qd) qd + g(q) = tau, and energies.
 
 Torques are `inverse_dynamics` at a state where the other terms vanish. The mass matrix and forward
-dynamics come from `closed_form`, which uses the same regrouped masses.
+dynamics of a parallelogram come from `closed_form`, which uses the same regrouped masses.
 """
 
 import numpy as np
@@ -31,8 +31,9 @@ def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Arr
     q = checked("q", q, 5)
     states = q.reshape(-1, 5)
     M = np.empty((len(states), 5, 5))
+    forms = mass_forms if boom.geometry.is_parallelogram else _columns
     for start in range(0, len(states), _CHUNK):
-        M[start : start + _CHUNK] = mass_forms(boom, states[start : start + _CHUNK])
+        M[start : start + _CHUNK] = forms(boom, states[start : start + _CHUNK])
     if drive_inertia:
         M = M + _drive_inertia(boom)
     M = (M + np.swapaxes(M, -1, -2)) / 2.0  # symmetric to the last bit
@@ -63,6 +64,9 @@ def mass_matrix_and_bias(
     outside = None if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
     push = None if tip_force is None else matched("tip_force", tip_force, shape)
 
+    if not boom.geometry.is_parallelogram:
+        bias = inverse_dynamics(boom, q, qd, np.zeros(5), base=base, tip_force=tip_force, reactions=False).tau
+        return mass_matrix(boom, q), bias
     if len(states) <= _CHUNK:
         M, bias = mass_and_bias(boom, states, rates, outside, push)
     else:
@@ -150,6 +154,11 @@ def potential_energy(boom: Boom, q: ArrayLike) -> Array:
     masses = {**boom.bodies, "payload": boom.payload}
     heights = {name: motion.com[..., 2] for name, motion in body_motion(boom, q, zero, zero).items()}
     return boom.gravity * np.asarray(sum(masses[name].mass * z for name, z in heights.items()))
+
+
+def _columns(boom: Boom, q: Array) -> Array:
+    """Return M (n, 5, 5) from the torques of unit accelerations without gravity, for any linkage."""
+    return inverse_dynamics(boom, q[:, None], np.zeros(5), np.eye(5), base=_falling(boom), reactions=False).tau
 
 
 def _drive_inertia(boom: Boom) -> Array:

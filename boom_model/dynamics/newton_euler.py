@@ -13,6 +13,8 @@ and its acceleration less gravity is sum_i g_i A_i. With the plane's angular vel
 Newton's and Euler's equations of a set of bodies ask no more of its masses than the constant Q = int g g^T dm: with
 U = Q A, the force on the set is U_o, and its moment about any pin a sum of b_i x U_i. The equilibrium of tool, extension,
 upper, outer, inner and lower link gives the joint torques and the pin forces from these (eqs. 2.45-2.71).
+
+All this holds for a parallelogram. Where the links are unequal, `virtual_work` takes its place.
 """
 
 from collections.abc import Sequence
@@ -28,6 +30,7 @@ from boom_model.arrays import Array, broadcast, checked, read_only
 from boom_model.boom import Body, Boom
 from boom_model.drives.drive import reflected_inertia
 from boom_model.dynamics.base_motion import BaseMotion
+from boom_model.dynamics.virtual_work import balance
 from boom_model.errors import InputError
 from boom_model.kinematics.frames import R_LINK_BODY
 
@@ -105,6 +108,7 @@ def inverse_dynamics(
 
     Raises:
         InputError: an input is not finite or of the wrong shape, or shapes do not match.
+        InfeasibleError: a linkage of unequal links cannot close at q.
 
     >>> boom = Boom.load()
     >>> loads = inverse_dynamics(boom, boom.pose("phenotyping"), np.zeros(5), np.zeros(5))
@@ -125,15 +129,18 @@ def inverse_dynamics(
         np.zeros((3, count, 3)) if reactions else None,
         np.empty((count, 6)) if reactions else None,
     )
-    model = regrouped(boom, payload_as)
+    model = regrouped(boom, payload_as) if boom.geometry.is_parallelogram else None
     rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) if drive_inertia else None
 
     def fill(motion: list[Array], outside: list[Array], push: Array | None, twist: Array | None, out: _Outputs) -> None:
-        state = _state(motion)
-        plane = _plane(boom, state, *map(_columns, outside))
-        force = None if push is None else _into_plane(state, _columns(push))
-        moment = None if twist is None else _into_plane(state, _columns(twist))
-        _newton_euler(model, state, plane, force, moment, out)
+        if model is None:
+            _by_virtual_work(boom, motion, outside, payload_as, [push, twist], out)
+        else:
+            state = _state(motion)
+            plane = _plane(boom, state, *map(_columns, outside))
+            force = None if push is None else _into_plane(state, _columns(push))
+            moment = None if twist is None else _into_plane(state, _columns(twist))
+            _newton_euler(model, state, plane, force, moment, out)
         if friction:
             out.tau[:] += boom.friction.torque(motion[1])
         if rotors is not None:
@@ -287,6 +294,23 @@ class _Outputs(NamedTuple):
             None if self.pins is None else self.pins[:, samples],
             None if self.mount is None else self.mount[samples],
         )
+
+
+def _by_virtual_work(
+    boom: Boom,
+    motion: Sequence[Array],
+    outside: Sequence[Array],
+    payload_as: PayloadAs,
+    applied: Sequence[Array | None],
+    out: _Outputs,
+) -> None:
+    """Fill the outputs of a chunk where the linkage is no parallelogram."""
+    base = BaseMotion.of(**dict(zip(BASE_ENTRIES, outside, strict=True))) if outside else BaseMotion.of()
+    q, qd, qdd = motion
+    found = balance(boom, q, qd, qdd, base, payload_as_force=payload_as == "force", tip_force=applied[0], tip_moment=applied[1])
+    out.tau[:] = found.tau
+    if out.pins is not None and out.mount is not None:
+        out.pins[:], out.mount[:] = found.pins, found.mount
 
 
 def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:

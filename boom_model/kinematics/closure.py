@@ -13,6 +13,9 @@ G^2 - L6^2). This gives
                                   b = 2 (F c3 + G s3),  c = 2 L6 (G c3 - F s3) - H
     for a given extension:        e cos(theta3) + d sin(theta3) = H - rho^2,
                                   d = 2 (rho G - F L6),  e = 2 (rho F + G L6)
+
+Here theta3 is the direction of the actuator. Where the linkage is no parallelogram,
+`linkage.lower_angle` gives the lower link's angle from it.
 """
 
 from typing import NamedTuple

@@ -16,6 +16,7 @@ from boom_model.boom import Boom
 from boom_model.drives.limits import static_limits
 from boom_model.dynamics.equations_of_motion import gravity_torque
 from boom_model.errors import InputError
+from boom_model.kinematics.linkage import directions
 from boom_model.words import joint_position, number, unknown
 
 
@@ -69,7 +70,8 @@ class LeastExtension:
 class NearestHorizontal:
     """Actuator as close to horizontal as possible.
 
-    Cost: |theta3 - pi| [rad]. Between equal costs, the smaller extension wins.
+    Cost: |theta3 - pi| [rad], of the actuator's own direction where the links are unequal. Between
+    equal costs, the smaller extension wins.
     """
 
     unit: ClassVar[str] = "rad of elevation"
@@ -79,7 +81,7 @@ class NearestHorizontal:
 
     def cost(self, boom: Boom, q: Array) -> Array:
         """Return the cost (...) of joint positions q (..., 5)."""
-        return np.abs(q[..., 2] - np.pi) + _TIE * q[..., 3]
+        return np.abs(directions(boom, q[..., 1], q[..., 2]).upper - np.pi) + _TIE * q[..., 3]
 
 
 @dataclass(frozen=True)

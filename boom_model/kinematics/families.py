@@ -15,6 +15,10 @@ Between two neighbouring values the family is either entirely within the limits 
 so the feasible intervals are exact. The least cost is at an end of an interval, at a stationary
 point in closed form, or at a minimum that a scan of the whole interval finds and golden section
 refines.
+
+Where the linkage is no parallelogram, theta3 above is the actuator's direction, and the limits of
+the lower link are found on a grid of theta2 and by bisection: a feasible interval shorter than a
+step of the grid can be missed.
 """
 
 from typing import NamedTuple
@@ -26,9 +30,11 @@ from boom_model.boom import Boom
 from boom_model.golden_section import golden_section
 from boom_model.kinematics.closure import closed_by_angle, closed_by_extension, turned_into_limits
 from boom_model.kinematics.constraints import ChoosingConstraint, LeastExtension, NearestHorizontal
+from boom_model.kinematics.linkage import lower_angle
 
 _SCAN = 64
 _REFINEMENTS = 60
+_GRID = 121  # values of theta2 at which a linkage of unequal links is tried: 1 deg apart on the shipped boom
 
 
 class Targets(NamedTuple):
@@ -68,14 +74,17 @@ def member(boom: Boom, targets: Targets, theta2: Array) -> Array:
     x, z = F - g.L9 * np.cos(theta2), G - g.L9 * np.sin(theta2)
     square = x * x + z * z - g.L6**2
     rho = np.sqrt(np.where(square > 0.0, square, np.nan))
-    theta3 = np.arctan2(-z, -x) - np.arctan2(g.L6, rho)
-    q = np.stack(np.broadcast_arrays(theta1, theta2, theta3, rho - g.L7, phi - theta3), axis=-1)
+    psi = np.arctan2(-z, -x) - np.arctan2(g.L6, rho)
+    theta3 = lower_angle(boom, theta2, psi)
+    q = np.stack(np.broadcast_arrays(theta1, theta2, theta3, rho - g.L7, phi - psi), axis=-1)
     return turned_into_limits(boom, q)
 
 
 def best_member(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> tuple[Array, Mask]:
     """Return the member of least cost within the limits (n, 5), and whether there is one (n,)."""
     ends = _ends(boom, targets, constraint)
+    if not boom.geometry.is_parallelogram:
+        ends = _with_boundaries(boom, targets, ends)
     at_ends = member(boom, targets, ends)
     best, cost = _least(boom, constraint, at_ends, ends)
     if not isinstance(constraint, LeastExtension | NearestHorizontal):  # their minimum is at an end
@@ -112,6 +121,25 @@ def _ends(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> Array
     theta2 = lower[1] + np.mod(theta2 - lower[1] + 1e-12, 2.0 * np.pi) - 1e-12
     theta2 = np.where((theta2 >= lower[1] - 1e-12) & (theta2 <= upper[1] + 1e-12), theta2, lower[1])
     return np.sort(np.clip(theta2, lower[1], upper[1]), axis=-1)
+
+
+def _with_boundaries(boom: Boom, targets: Targets, ends: Array) -> Array:
+    """Return candidate values of theta2 with those where a limit of the lower link is reached, by bisection."""
+    limits = boom.limits
+    grid = np.broadcast_to(np.linspace(limits.lower[1], limits.upper[1], _GRID), (len(ends), _GRID))
+    theta2 = np.sort(np.concatenate([ends, grid], axis=-1), axis=-1)
+
+    def within(theta2: Array) -> Mask:
+        return np.asarray(limits.contain(member(boom, targets, theta2)))
+
+    low, high = theta2[:, :-1].copy(), theta2[:, 1:].copy()
+    at_low, changes = within(low), within(low) != within(high)
+    for _ in range(_REFINEMENTS):
+        middle = (low + high) / 2.0
+        same = within(middle) == at_low
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    inside = np.where(at_low, low, high)
+    return np.sort(np.concatenate([ends, np.where(changes, inside, limits.lower[1])], axis=-1), axis=-1)
 
 
 def _at_linkage_angle(boom: Boom, F: Array, G: Array, delta: float, root: float) -> Array:

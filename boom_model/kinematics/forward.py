@@ -4,6 +4,8 @@ With rho = L7 + theta4 and phi = theta3 + theta5, in the arm's vertical plane (r
 
     r = L2 + L9 cos(theta2) - rho cos(theta3) + L6 sin(theta3) - L8 sin(phi)
     z = L1 + L9 sin(theta2) - rho sin(theta3) - L6 cos(theta3) + L8 cos(phi)
+
+Where the linkage is no parallelogram, psi(theta2, theta3) of `linkage` takes the place of theta3.
 """
 
 from dataclasses import dataclass
@@ -15,7 +17,8 @@ from boom_model.arrays import Array, broadcast, checked
 from boom_model.boom import Boom
 from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.errors import InputError
-from boom_model.kinematics.frames import BODY_FRAMES, SLIDING_ROW, THETA_RATES, Loop, frame_transforms
+from boom_model.kinematics.frames import BODY_FRAMES, SLIDING_ROW, Loop, frame_transforms, theta_motion
+from boom_model.kinematics.linkage import accelerations, rates, require_closed
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ def forward_kinematics(boom: Boom, q: ArrayLike) -> TipPose:
     >>> [round(float(x), 3) for x in forward_kinematics(boom, boom.pose("phenotyping")).position]
     [0.0, 2.29, 0.978]
     """
-    q = checked("q", q, 5)
+    q = _with_actuator(boom, checked("q", q, 5))
     r, z = _tip_in_plane(boom, q)
     c1, s1 = np.cos(q[..., 0]), np.sin(q[..., 0])
     phi = q[..., 2] + q[..., 4]
@@ -67,14 +70,18 @@ def forward_kinematics(boom: Boom, q: ArrayLike) -> TipPose:
 def jacobian(boom: Boom, q: ArrayLike) -> Array:
     """Return the geometric Jacobian of the tip in frame 1, (..., 6, 5): [v; omega] = J qd.
 
-    The upper rows give velocity [m/s], the lower ones angular velocity [rad/s]. The inner link does
-    not rotate the tip, because the parallelogram keeps the actuator's direction. Derived from
-    thesis eq. 2.19.
+    The upper rows give velocity [m/s], the lower ones angular velocity [rad/s]. In a parallelogram
+    the inner link does not rotate the tip. Derived from thesis eq. 2.19.
 
     Raises:
         InputError: q is not finite or not (..., 5).
     """
     q = checked("q", q, 5)
+    return _by_joints(boom, q, _actuator_jacobian(boom, _with_actuator(boom, q)))
+
+
+def _actuator_jacobian(boom: Boom, q: Array) -> Array:
+    """Return the Jacobian by (theta1, theta2, psi, theta4, theta5), whose values are q."""
     g = boom.geometry
     rho = g.L7 + q[..., 3]
     c1, s1 = np.cos(q[..., 0]), np.sin(q[..., 0])
@@ -102,6 +109,23 @@ def jacobian_rate(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
         InputError: q or qd is not finite or not (..., 5), or they do not broadcast.
     """
     q, qd = broadcast(q=q, qd=qd)
+    turned, turning = _with_actuator(boom, q), qd
+    if not boom.geometry.is_parallelogram:
+        turning = qd.copy()
+        turning[..., 2] = rates(boom, q, qd).upper
+    J_rate = _by_joints(boom, q, _actuator_jacobian_rate(boom, turned, turning))
+    if not boom.geometry.is_parallelogram:  # psi'' - D qdd is quadratic in qd; its polar form gives the columns
+        across, still = _actuator_jacobian(boom, turned)[..., 2], np.zeros_like(q)
+        for i in (1, 2):
+            unit = np.zeros_like(q)
+            unit[..., i] = 1.0
+            both, less = (accelerations(boom, q, qd + sign * unit, still).upper for sign in (1.0, -1.0))
+            J_rate[..., i] += across * ((both - less) / 4.0)[..., None]
+    return J_rate
+
+
+def _actuator_jacobian_rate(boom: Boom, q: Array, qd: Array) -> Array:
+    """Return the time derivative of `_actuator_jacobian` at the same coordinates and their rates."""
     g = boom.geometry
     v1, v2, v3, v4, _ = np.moveaxis(qd, -1, 0)
     rho, vt = g.L7 + q[..., 3], qd[..., 2] + qd[..., 4]
@@ -202,7 +226,7 @@ def frame_motion(
     """
     q, qd, qdd = broadcast(q=q, qd=qd, qdd=qdd)
     T = frame_transforms(boom, q, loop)
-    spin, spin_up = qd @ THETA_RATES[loop].T, qdd @ THETA_RATES[loop].T
+    spin, spin_up = theta_motion(boom, q, qd, qdd, loop)
     base = BaseMotion.of() if base is None else base
     start = (base.velocity, base.angular_velocity, base.acceleration, base.angular_acceleration)
     try:
@@ -252,6 +276,26 @@ def body_motion(
             angular_acceleration=w1,
         )
     return motions
+
+
+def _with_actuator(boom: Boom, q: Array) -> Array:
+    """Return q with the actuator's direction psi in the place of theta3."""
+    if boom.geometry.is_parallelogram:
+        return q
+    turned = q.copy()
+    turned[..., 2] = require_closed(boom, q)
+    return turned
+
+
+def _by_joints(boom: Boom, q: Array, J: Array) -> Array:
+    """Return a Jacobian by the joints from one by (theta1, theta2, psi, theta4, theta5), at q."""
+    if boom.geometry.is_parallelogram:
+        return J
+    by_2, by_3 = (rates(boom, q, np.broadcast_to(np.eye(5)[i], q.shape)).upper for i in (1, 2))
+    joined = J.copy()
+    joined[..., 1] += J[..., 2] * by_2[..., None]
+    joined[..., 2] *= by_3[..., None]
+    return joined
 
 
 def _tip_in_plane(boom: Boom, q: Array) -> tuple[Array, Array]:

@@ -1,7 +1,8 @@
 """The two Denavit-Hartenberg loops of the thesis, and the frame of each body.
 
 Frame 1 is the base, frame 11 the tip. Row i of a table takes frame i to frame i+1 (thesis, tables
-2-1 and 2-2 with the corrections of rows 8 and 6). Transforms are named T_parent_child: T multiplies
+2-1 and 2-2 with the corrections of rows 8 and 6). In a linkage of unequal links, psi and chi of
+`linkage` take the places of theta3 and theta2. Transforms are named T_parent_child: T multiplies
 the coordinates of a point in the child and gives those in the parent.
 """
 
@@ -12,6 +13,8 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, checked, read_only
 from boom_model.boom import Boom
+from boom_model.kinematics.linkage import accelerations, rates, require_closed
+from boom_model.kinematics.linkage import directions as linkage_directions
 
 Loop = Literal["inner", "outer"]
 
@@ -60,7 +63,7 @@ THETA_RATES = {
         ]
     ),
 }
-"""Rates of the angles theta_i of all rows (10, 5): d(theta_i)/dt = THETA_RATES[loop][i] @ qd."""
+"""Rates of the angles theta_i of all rows (10, 5) in a parallelogram: d(theta_i)/dt = THETA_RATES[loop][i] @ qd."""
 
 SLIDING_ROW = 7
 """Index of the row whose d_i belongs to the extension: d(d_i)/dt = qd[3]."""
@@ -76,27 +79,47 @@ def dh_rows(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
 
     Raises:
         InputError: q is not finite or not (..., 5).
+        InfeasibleError: the linkage cannot close at q.
     """
     q = checked("q", q, 5)
     g = boom.geometry
     t1, t2, t3, t4, t5 = np.moveaxis(q, -1, 0)
+    psi = require_closed(boom, q)  # theta3 in a parallelogram
+    chi = linkage_directions(boom, t2, t3).outer  # theta2 in a parallelogram
     right, half = np.pi / 2.0, np.pi
     a: tuple[float, ...]
     theta: tuple[Any, ...]
     if loop == "inner":
         alpha = (0, 0, 0, right, 0, 0, 0, right, right, 0)
         a = (0, 0, g.L2, 0, g.L9, 0, 0, g.L6, 0, g.L8)
-        theta = (t1, 0, 0, t2, t3 - t2 - right, 0, 0, half, t5, 0)
+        theta = (t1, 0, 0, t2, psi - t2 - right, 0, 0, half, t5, 0)
     else:
         alpha = (0, 0, 0, right, 0, 0, 0, right, right, 0)
         a = (0, 0, g.L2, 0, g.L3, g.L4, g.L5, g.L6, 0, g.L8)
-        theta = (t1, 0, 0, t3, 2.0 * half - t3 + t2, half + t3 - t2, right, half, t5, 0)
+        theta = (t1, 0, 0, t3, 2.0 * half - t3 + chi, half + psi - chi, right, half, t5, 0)
     d = (0, g.L1, 0, 0, 0, 0, 0, g.L7 + t4, 0, 0)
     rows = np.empty((*q.shape[:-1], 10, 4))
     for column, entries in enumerate((alpha, a, d, theta)):
         for row, entry in enumerate(entries):
             rows[..., row, column] = entry
     return rows
+
+
+def theta_motion(boom: Boom, q: Array, qd: Array, qdd: Array, loop: Loop) -> tuple[Array, Array]:
+    """Return the first and second time derivatives (..., 10) of the angles theta_i of all rows of one loop."""
+    known = THETA_RATES[loop].T
+    spin, spin_up = qd @ known, qdd @ known
+    if boom.geometry.is_parallelogram:
+        return spin, spin_up
+    turned = (spin, qd, rates(boom, q, qd)), (spin_up, qdd, accelerations(boom, q, qd, qdd))
+    for rows, given, linkage in turned:
+        psi, chi = linkage.upper - given[..., 2], linkage.outer - given[..., 1]
+        if loop == "inner":
+            rows[..., 4] += psi
+        else:
+            rows[..., 4] += chi
+            rows[..., 5] += psi - chi
+    return spin, spin_up
 
 
 def frame_transforms(boom: Boom, q: ArrayLike, loop: Loop) -> Array:

@@ -22,6 +22,7 @@ from boom_model.kinematics.constraints import (
     parse_constraint,
 )
 from boom_model.kinematics.families import Targets, best_member, targets_at
+from boom_model.kinematics.linkage import lower_angle
 
 _PITCHES = 360
 _REFINEMENTS = 40
@@ -257,7 +258,9 @@ def _constrained(boom: Boom, targets: Targets, constraint: FixingConstraint, dis
         closure = closed_by_angle(boom, np.full_like(F, np.pi + scalar("elevation", constraint.elevation)), F, G, root)
     exists = closure.exists & np.repeat(distinct, 2, axis=-1)
     extension = closure.rho - boom.geometry.L7
-    q = np.stack([theta1, closure.theta2, closure.theta3, extension, phi - closure.theta3], axis=-1)
+    theta3 = lower_angle(boom, closure.theta2, closure.theta3)  # the closure gives the actuator's direction
+    exists = exists & np.isfinite(theta3)
+    q = np.stack([theta1, closure.theta2, theta3, extension, phi - closure.theta3], axis=-1)
     q[~exists] = np.nan
     return turned_into_limits(boom, q), exists
 

@@ -159,7 +159,7 @@ def plots(
 
 
 def _map_at(field: "PlotMap", tags: "SensorTags") -> "PlotMap":
-    """The map with its ground at the height of what was seen, checked to be where the log is."""
+    """Return the map with its ground at the height of what was seen, checked to be where the log is."""
     from planner.field.plots import require_near
 
     latitude, longitude, height = tags.seen.geodetic

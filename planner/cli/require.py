@@ -57,7 +57,7 @@ def require(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """What the drive of each joint must give on a mission, with a drive or without: the sheet for a supplier.
+    """List what the drive of each joint must give on a mission: a sheet for a supplier.
 
     MISSION is a FILE.toml, or one of field-day, table-2-4 and table-3-1.
 
