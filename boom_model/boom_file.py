@@ -40,14 +40,13 @@ from boom_model.plausible import (
     VOLTAGE,
     WIDTH,
 )
-from boom_model.provenance import Basis, Origin, Sourced
+from boom_model.provenance import Basis, BasisName, Origin, Sourced
 from boom_model.toml_file import Table, read_toml
 from boom_model.words import nearest_name
 
 BOOM_FILE = Path(str(files("boom_model") / "data" / "third_generation.toml"))
 
 V = TypeVar("V")
-BasisName = Literal["printed", "estimated", "assumed"]
 _Mass = Annotated[float, MASS]
 _Offset = Annotated[float, OFFSET]
 Triple = Annotated[list[_Offset], Field(min_length=3, max_length=3)]

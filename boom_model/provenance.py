@@ -1,16 +1,20 @@
-"""Provenance of a value: printed in a source, estimated from printed values, or assumed."""
+"""Provenance of a value: measured, printed in a source, estimated from printed values, or assumed."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Generic, TypeVar
+from typing import Generic, Literal, TypeVar
 
 T = TypeVar("T")
+BasisName = Literal["measured", "printed", "estimated", "assumed"]
+"""A basis as files name it."""
 
 
 class Basis(StrEnum):
     """Reliability of a value, the most reliable first."""
 
+    MEASURED = "measured"
+    """On the machine itself, by `boom calibrate` or `boom identify`; the source names the log."""
     PRINTED = "printed"
     ESTIMATED = "estimated"
     ASSUMED = "assumed"

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -17,7 +17,7 @@ from boom_model.kinematics.frames import R_LINK_BODY
 from boom_model.link_design.beam import Beam, Support
 from boom_model.link_design.materials import Material
 from boom_model.plausible import MASS, THICKNESS, WIDTH
-from boom_model.provenance import Basis, Origin
+from boom_model.provenance import Basis, BasisName, Origin
 from boom_model.toml_file import Table, read_toml
 from boom_model.words import unknown
 
@@ -183,7 +183,7 @@ class _FittingsTable(Table):
     mass_kg: Annotated[float, MASS]
     com_m: Triple
     inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)]
-    basis: Literal["printed", "estimated", "assumed"]
+    basis: BasisName
     source: str
 
 
@@ -194,7 +194,7 @@ class _LinkTable(Table):
     designed_from: Annotated[float, Field(ge=0, lt=1)] = 0.0
     designed_to: Annotated[float, Field(gt=0, le=1)] = 1.0
     cross_plates: Annotated[int, Field(ge=0, le=1000)] = 0
-    basis: Literal["printed", "estimated", "assumed"]
+    basis: BasisName
     source: str
     fittings: _FittingsTable | None = None
 

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
-from boom_model.provenance import Basis, Origin
+from boom_model.provenance import Basis, BasisName, Origin
 from boom_model.toml_file import Positive, Table, read_toml
 from boom_model.words import unknown
 
@@ -62,7 +62,7 @@ class _MaterialTable(Table):
     density_kg_m3: Positive
     yield_stress_MPa: Positive
     poisson_ratio: Annotated[float, Field(ge=0, lt=0.5, allow_inf_nan=False)]
-    basis: Literal["printed", "estimated", "assumed"]
+    basis: BasisName
     source: str
 
 

@@ -11,7 +11,7 @@ from functools import cached_property
 from importlib.resources import files
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -21,6 +21,7 @@ from boom_model.arrays import Array, read_only
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import parse_constraint
 from boom_model.plausible import DURATION, LIFE, TIP_TOLERANCE
+from boom_model.provenance import BasisName
 from boom_model.toml_file import Table, read_toml
 from planner.checks.drives.duty import Duty
 from planner.files import named_file
@@ -82,7 +83,7 @@ class _Step(Table):
 
 class _MissionTable(Table):
     name: str
-    basis: Literal["printed", "estimated", "assumed"]
+    basis: BasisName
     source: str
     start: str
     pitch: str = _DOWN

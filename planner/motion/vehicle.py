@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,7 @@ from boom_model.plausible import (
     VEHICLE_SPEED,
     WAVELENGTH,
 )
+from boom_model.provenance import BasisName
 from boom_model.toml_file import Table, read_toml
 from planner.files import named_file
 
@@ -170,7 +171,7 @@ class _Shock(Table):
 
 class _CaseTable(Table):
     name: str
-    basis: Literal["printed", "estimated", "assumed"]
+    basis: BasisName
     source: str
     slope: _Slope = Field(default_factory=_Slope)
     track: _Track | None = None

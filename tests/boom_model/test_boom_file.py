@@ -57,6 +57,17 @@ def test_bodies_are_those_of_appendix_c(name, grams, com, inertia):
     np.testing.assert_allclose(body.inertia, np.diag(inertia) / 1e9, rtol=ROUNDING, atol=0)
 
 
+def test_a_measured_figure_is_the_most_reliable_and_a_file_may_have_one(tmp_path):
+    assert list(Basis) == [Basis.MEASURED, Basis.PRINTED, Basis.ESTIMATED, Basis.ASSUMED]
+    assert Basis.weakest([Basis.MEASURED, Basis.PRINTED]) is Basis.PRINTED
+    file = tmp_path / "boom.toml"
+    text = BOOM_FILE.read_text(encoding="utf-8")
+    file.write_text(text.replace('basis = "printed"\nsource = "thesis, section 1.2.1', 'basis = "measured"\nsource = "scale'))
+    assert Boom.load(file).payload.mass == 10.0
+    file.write_text(text.replace('value = 30.0, basis = "assumed"', 'value = 30.0, basis = "measured"', 1))
+    assert Boom.load(file).limits.origins["velocity"][0].basis is Basis.MEASURED
+
+
 def test_there_are_no_other_bodies():
     assert set(BOOM.bodies) == {"base", "lower", "inner", "outer", "upper", "extension", "end_effector"}
     # 28404.94 + 2494.21 + 10902.05 + 3880.04 + 2978.79 + 2125.98 + 783.66 g

@@ -79,6 +79,7 @@ def test_a_missing_figure_is_not_checkable(figure, check_name):
         (Sourced(False, SHEET), Verdict.FAIL),
         (Sourced(True, Origin(Basis.ASSUMED, "hoped for")), Verdict.WARN),
         (Sourced(True, SHEET), Verdict.PASS),
+        (Sourced(True, Origin(Basis.MEASURED, "seen on the machine")), Verdict.PASS),
     ],
 )
 def test_power_off_needs_a_brake(brake, verdict):
