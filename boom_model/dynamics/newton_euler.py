@@ -120,7 +120,7 @@ def inverse_dynamics(
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [x.reshape(-1, 5) for x in (positions, rates, accelerations)]
-    outside = [] if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
+    outside = base_series(base, shape)
     push = None if tip_force is None else matched("tip_force", tip_force, shape)
     twist = None if tip_moment is None else matched("tip_moment", tip_moment, shape)
     count = len(motion[0])
@@ -173,6 +173,44 @@ def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
     return np.stack([-(c * x + s * z), s * x - c * z, np.zeros_like(x)], axis=-1)
 
 
+def base_series(base: BaseMotion | None, shape: tuple[int, ...]) -> list[Array]:
+    """Return the entries of a base motion at states of a shape, flattened: (n, 3) each; [] for None.
+
+    Raises:
+        InputError: an entry does not match the states.
+    """
+    return [] if base is None else [matched(f"base {name}", getattr(base, name), shape) for name in BASE_ENTRIES]
+
+
+def element_accelerations(boom: Boom, q: Array, qd: Array, qdd: Array, *base: Array) -> Array:
+    """Return A (3, 11, n) of n states (n, 5) along x, z and n, on a base moved as `base_series` says."""
+    state = _State(*(list(np.ascontiguousarray(x.T)) for x in (q, qd, qdd)))
+    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
+    plane = _plane(boom, state, *(list(x.T) for x in base))
+    return _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), boom.geometry.L7 + q[:, 3])
+
+
+def element_velocities(boom: Boom, q: Array) -> Array:
+    """Return db/dq (5, 3, 11, n) of every joint and vector b at n states (n, 5), along x, z and n.
+
+    Yaw turns the plane about z: x goes to -n, n to x. An angle turns its links' e to p, and p to -e.
+    """
+    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
+    rho = boom.geometry.L7 + q[:, 3]
+    moved = np.zeros((5, 3, 11, len(q)))
+    moved[0, 0, _N] = 1.0
+    moved[0, 2, _X] = -1.0
+    for joints, (e, p), c, s in (((1,), _LINKS[0], c2, s2), ((2,), _LINKS[1], c3, s3), ((2, 4), _LINKS[2], ct, st)):
+        moved[0, 2, e], moved[0, 2, p] = -c, s
+        for joint in joints:
+            moved[joint, 0, e], moved[joint, 1, e] = -s, c
+            moved[joint, 0, p], moved[joint, 1, p] = -c, -s
+    moved[0, 2, _RHO] = -rho * c3
+    moved[2, 0, _RHO], moved[2, 1, _RHO] = -rho * s3, rho * c3
+    moved[3, 0, _RHO], moved[3, 1, _RHO] = c3, s3
+    return moved
+
+
 class Regrouped(NamedTuple):
     """The boom's masses, regrouped."""
 
@@ -192,7 +230,7 @@ class Regrouped(NamedTuple):
 @lru_cache(maxsize=16)
 def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
     """Return the regrouped masses of a boom, with the payload as a mass or as a force."""
-    elements = _elements(boom)
+    elements = body_elements(boom)
     bodies = {**boom.bodies, "payload": boom.payload}
     Q = {name: elements[name].T @ _pseudo_inertia(body, R_LINK_BODY[name]) @ elements[name] for name, body in bodies.items()}
     if payload_as == "force":
@@ -210,7 +248,7 @@ def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
     )
 
 
-def _elements(boom: Boom) -> dict[str, Array]:
+def body_elements(boom: Boom) -> dict[str, Array]:
     """Return g of each body's frame origin, and its change per metre along e, p and n, (4, 11)."""
     g, unit = boom.geometry, np.eye(11)
     shoulder = unit[_O] + g.L2 * unit[_X] + g.L1 * unit[_Z]

@@ -369,7 +369,7 @@ def accelerations(
         thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.elastic_rotor
     if plant.has_joint_friction:
         direction = np.tanh(qd / plant.stick)
-        tau -= boom.friction.viscous * qd + boom.friction.coulomb * direction
+        tau -= boom.friction.viscous * qd + boom.friction.dry(direction)
     M, bias = mass_matrix_and_bias(boom, q, qd, base=base, tip_force=tip_force)
     qdd = np.linalg.solve(M + plant.rigid_inertia, (tau - bias)[..., None])[..., 0]
     return np.asarray(qdd), thetadd

@@ -1,0 +1,80 @@
+"""The regressor against inverse dynamics and Pinocchio's regressor carried through the loop; parameters and bodies."""
+
+import numpy as np
+import pinocchio
+import pytest
+
+from boom_model import BaseMotion, Boom, inverse_dynamics
+from boom_model.arrays import Array
+from boom_model.dynamics.regressor import (
+    REGRESSOR_BODIES,
+    inertial_parameters,
+    regressor,
+)
+from tests.oracles import (
+    fixed_root,
+    instants,
+    pinocchio_model,
+    random_base,
+    random_states,
+    tree,
+    tree_matrix,
+)
+
+COUNT = 1000
+
+
+def rank(Y: Array) -> int:
+    """Rank of stacked regressors (n, 5, p), by singular values of its scaled columns."""
+    stacked = Y.reshape(-1, Y.shape[-1])
+    norms = np.linalg.norm(stacked, axis=0)
+    told = norms > 1e-12 * norms.max()
+    values = np.linalg.svd(stacked[:, told] / norms[told], compute_uv=False) / np.sqrt(told.sum())
+    assert not ((values > 1e-12) & (values < 1e-6)).any()  # nothing in doubt
+    return int((values > 1e-9).sum())
+
+
+def through_the_loop(boom: Boom, states: tuple[Array, Array, Array], base: BaseMotion | None) -> Array:
+    """G^T Y_tree of Pinocchio's joint torque regressor, (n, 5, 70): the payload is part of the end effector."""
+    free = pinocchio_model(boom)
+    model = free if base is not None else fixed_root(free)
+    data, G = model.createData(), tree_matrix(boom)
+    order = [link.body for link in tree(boom)]
+    columns = [order.index(name) for name in REGRESSOR_BODIES[:-1]]
+    first = 6 if base is not None else 0
+    found = []
+    for q, qd, qdd, now in zip(*states, instants(base, len(states[0])), strict=True):
+        x, xd, xdd = G @ q, G @ qd, G @ qdd
+        if base is not None:
+            # Any rotation with this `up`; a free-flyer's linear rate is the spatial acceleration a - w x v.
+            R = pinocchio.Quaternion.FromTwoVectors(now.up, np.array([0.0, 0.0, 1.0])).toRotationMatrix()
+            x = np.concatenate([pinocchio.SE3ToXYZQUAT(pinocchio.SE3(R, np.zeros(3))), x])
+            root = now.acceleration - np.cross(now.angular_velocity, now.velocity)
+            xd = np.concatenate([now.velocity, now.angular_velocity, xd])
+            xdd = np.concatenate([root, now.angular_acceleration, xdd])
+        Y = pinocchio.computeJointTorqueRegressor(model, data, x, xd, xdd)[first:]
+        Y = Y.reshape(7, -1, 10)[:, -7:][:, columns]
+        found.append((G.T @ Y.reshape(7, -1)).copy())
+    return np.array(found)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_it_gives_the_torques_of_inverse_dynamics(boom: Boom, moving: bool) -> None:
+    rng = np.random.default_rng(1)
+    states = random_states(boom, COUNT, rng)
+    base = random_base(rng, COUNT) if moving else None
+    expected = inverse_dynamics(boom, *states, base=base, reactions=False).tau
+    actual = regressor(boom, *states, base=base) @ inertial_parameters(boom)
+    np.testing.assert_allclose(actual, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_it_is_pinocchios_regressor_carried_through_the_loop(boom: Boom, moving: bool) -> None:
+    rng = np.random.default_rng(2)
+    states = random_states(boom, 100, rng)
+    base = random_base(rng, 100) if moving else None
+    expected = through_the_loop(boom, states, base)
+    actual = regressor(boom, *states, base=base)[..., :70]
+    np.testing.assert_allclose(actual, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+    assert rank(actual) == rank(expected)
+    print(moving, rank(actual))
