@@ -9,7 +9,7 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, files, kinematics, link, moves, view
+from planner.cli import control, data, drives, files, kinematics, link, moves, page, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -92,6 +92,7 @@ for _command in (
     files.compare,
     files.validate,
     view.view,
+    page.jog,
     data.info,
     data.catalogue,
     data.new,

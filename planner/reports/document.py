@@ -67,11 +67,17 @@ def without_pictures(markdown: str) -> str:
     return re.sub(r"<(?=[A-Za-z/!?])", r"\\<", markdown.replace("![", r"!\["))
 
 
-def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figure"]) -> None:
+def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figure"], command: str | None = None) -> None:
     """Write a report with its pictures by title, the command line and the library versions.
 
     HTML and PDF files contain their pictures. A Markdown file refers to pictures beside it, named
     FILE-1.png, FILE-2.png and so on.
+
+    Args:
+        path: the file.
+        markdown: the report.
+        pictures: figures by title.
+        command: the command that makes this report; None is the running one.
 
     Raises:
         InputError: the ending is unknown, or a file cannot be written. An existing file is left
@@ -80,7 +86,7 @@ def write_document(path: str | Path, markdown: str, pictures: Mapping[str, "Figu
     require_form(str(path))
     path, markdown = Path(path), without_pictures(markdown)
     drawn = {title: _png(figure) for title, figure in pictures.items()}
-    made = f"Made by `{command_line()}` with {', '.join(_versions())}, Python {sys.version.split()[0]}."
+    made = f"Made by `{command or command_line()}` with {', '.join(_versions())}, Python {sys.version.split()[0]}."
     with replacing(path) as temporary:
         place = Path(temporary)
         if path.suffix == ".md":
