@@ -2,6 +2,7 @@
 
 import sys
 import webbrowser
+from importlib.util import find_spec
 
 import click
 
@@ -29,10 +30,8 @@ def jog(payload: float | None, port: int, no_browser: bool, boom_file: str | Non
     if not _PORTS[0] <= port <= _PORTS[1]:
         raise InputError(f"port is {port}; it must be between {_PORTS[0]} and {_PORTS[1]}")
     boom = load_boom(boom_file)
-    try:
-        import viser  # noqa: F401
-    except ModuleNotFoundError:
-        raise InputError("boom jog needs viser; install the extra page: pip install 'boom[page]'") from None
+    if find_spec("viser") is None:
+        raise InputError("boom jog needs the extra page: pip install 'boom[page]'")
     from planner.page.server import Page
     from planner.page.state import first_state
 

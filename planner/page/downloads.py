@@ -69,10 +69,10 @@ def mission_file(state: State) -> str:
     document["basis"] = "assumed"
     document["source"] = "planned on the page"
     document["start"] = words.start
-    document["pitch"] = words.pitch
-    document["constraint"] = words.constraint
     step = tomlkit.table()
     step["to"] = words.goal
+    for table in (document, step):  # of the start, and of the targets after it
+        table["pitch"], table["constraint"] = words.pitch, words.constraint
     step["profile"] = words.profile
     given: Mapping[str, Any] = {
         "via": list(words.via),

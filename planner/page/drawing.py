@@ -60,8 +60,9 @@ class Drawing:
 
     def show_pose(self, view: PoseView, yaw: float) -> None:
         """Show the bodies and the arrows of a joint position."""
-        for name, handle in self._bodies.items():
-            handle.position, handle.wxyz = view.bodies[name][:3, 3], _wxyz(view.bodies[name][:3, :3])
+        T = np.stack([view.bodies[name] for name in self._bodies])
+        for handle, position, wxyz in zip(self._bodies.values(), T[:, :3, 3], _wxyz(T[:, :3, :3]), strict=True):
+            handle.position, handle.wxyz = position, wxyz
         self._plane.wxyz = np.array([np.cos(yaw / 2.0), 0.0, 0.0, np.sin(yaw / 2.0)])
         points = np.array([[foot, foot + vector] for _, foot, vector in view.arrows])
         if self._arrows is None or len(self._arrows.points) != len(points):
@@ -111,4 +112,5 @@ class Drawing:
 
 
 def _wxyz(R: Array) -> Any:
-    return np.roll(Rotation.from_matrix(R).as_quat(), 1)
+    """Return the quaternions (..., 4) of rotations (..., 3, 3), the real part first."""
+    return np.roll(Rotation.from_matrix(R).as_quat(), 1, axis=-1)

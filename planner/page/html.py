@@ -7,7 +7,7 @@ from planner.page.pose_view import Bar, Figure, fixed
 from planner.recording.palette import GREEN, GREY, ORANGE, PURPLE, VERMILION, Color
 from planner.recording.torque_ratio import BANDS
 
-_CELL = "padding:1px 6px 1px 0;vertical-align:baseline"
+_CELL = "padding:1px 5px 1px 0;vertical-align:baseline"
 _NUMBER = f"{_CELL};text-align:right;font-variant-numeric:tabular-nums"
 _BAR = "height:9px;border-radius:2px"
 _VERDICTS: dict[str, Color] = {"FAIL": VERMILION, "WARN": ORANGE, "PASS": GREEN, "INCO": PURPLE, "NOT ": PURPLE, "no d": GREY}
@@ -68,7 +68,7 @@ def table_html(header: Sequence[str], rows: Iterable[Sequence[str]], name: str) 
     head = "".join(f'<th style="{_CELL};text-align:left">{escape(each)}</th>' for each in header)
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
     return (
-        f'<div style="overflow-x:auto"><table id="{name}" style="border-collapse:collapse;font-size:11.5px;white-space:nowrap">'
+        f'<div style="overflow-x:auto"><table id="{name}" style="border-collapse:collapse;font-size:11px;white-space:nowrap">'
         f"<tr>{head}</tr>{body}</table></div>"
     )
 

@@ -53,10 +53,14 @@ def verdict_view(planned: Planned) -> str:
     )
     notes = [f"note: {note}" for note in move.report.notes]
     count = f"{first.assumed} assumed figures, {len(move.report.rows)} checks; the report lists them"
-    return block(
-        f'<div id="asked">{escape(asked)}</div>{verdict_html(first.sentence)}'
-        f"{table_html(JOINT_HEADER, first.joints, 'joints')}{lines_html((*first.findings, *notes, count))}"
-    )
+    joints = table_html(_in_order(JOINT_HEADER), map(_in_order, first.joints), "joints")
+    findings = lines_html((*first.findings, *notes, count))
+    return block(f'<div id="asked">{escape(asked)}</div>{verdict_html(first.sentence)}{joints}{findings}')
+
+
+def _in_order(row: Sequence[str]) -> tuple[str, ...]:
+    """Return a row of `joint_table` with the verdict second, where a narrow panel shows it."""
+    return row[0], row[-1], *row[1:-1]
 
 
 def now_view(planned: Planned, time: float) -> str:

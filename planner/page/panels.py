@@ -16,8 +16,8 @@ from planner.page.state import FLAGS, State, drive_field
 from planner.timing.profile import PROFILES
 
 _WIDTH = 340  # [px] of each panel: 600 px of 1280 are left for the scene
-_KINDS = {"recording": "Recording .rrd", "csv": "Motion .csv", "report": "Report .html", "mission": "Mission .toml"}
-_BESIDE = {"boom": "Boom .toml", "vehicle": "Vehicle .toml"}
+SAVED = ("recording", "csv", "report", "mission", "boom", "vehicle")
+"""Kinds of files, as `downloads.files_of` has them."""
 
 Edit = Callable[[str, str], None]
 """Takes a field's name and its new text."""
@@ -83,6 +83,10 @@ class Panels:
         """Add a button."""
         self.buttons[name] = self.gui.add_button(label, hint=hint)
 
+    def group(self, name: str, label: str, options: tuple[str, ...], hint: str) -> None:
+        """Add buttons side by side."""
+        self.buttons[name] = self.gui.add_button_group(label, options, hint=hint)
+
     def place(self, *names: str) -> None:
         """Add places for views."""
         for name in names:
@@ -135,8 +139,8 @@ def _pose(panels: Panels, state: State) -> None:
         low, high = round(turn * float(limits.lower[i]), 9), round(turn * float(limits.upper[i]), 9)
         panels.slider(joint, f"{joint} [{unit}]", low, high, step, state.joints[i])
     panels.text("pose", "pose", state.asked["pose"], "A pose's name, or q=YAW,INNER,LOWER,EXTENSION,WRIST in deg and m")
-    for name in state.boom.poses:
-        panels.button(f"pose {name}", name, "Move the boom to this pose")
+    if state.boom.poses:
+        panels.group("pose", "go to", tuple(state.boom.poses), "Move the boom to this pose")
     panels.text("payload", "payload [kg]", state.asked["payload"], "Mass at the tip")
     panels.text("roll", "roll [deg]", "0", "Tilt of the vehicle about its forward axis, left side up")
     panels.text("nose", "nose down [deg]", "0", "Tilt of the vehicle about its left axis")
@@ -148,12 +152,10 @@ def _target(panels: Panels, state: State) -> None:
     panels.text("pitch", "pitch", "down", "Elevation of the end effector: down, level, up, free, or degrees")
     panels.text("constraint", "constraint", "horizontal", f"{', '.join(WORDS)}, actuator=DEG or extension=M")
     panels.place("solving")
-    panels.button("branch before", "Branch before")
-    panels.button("branch next", "Next branch")
+    panels.group("branch", "branch", ("before", "next"), "Step through the branches within the limits")
     panels.place_complaint("branch")
     panels.place("branches")
-    panels.button("workspace", "Show the workspace", "Cells that the tip reaches under this pitch and constraint")
-    panels.button("workspace off", "Hide the workspace")
+    panels.group("workspace", "workspace", ("show", "hide"), "Cells that the tip reaches under this pitch and constraint")
     panels.place("workspace", "mapping")
 
 
@@ -161,8 +163,7 @@ def _move(panels: Panels, state: State) -> None:
     panels.text("start", "start", state.asked["start"], "A pose's name, q=... or tip=X,Y,Z")
     panels.text("via", "via", "", "Targets on the way, with semicolons between them; the move stops there")
     panels.text("goal", "goal", state.asked["goal"], "A pose's name, q=... or tip=X,Y,Z")
-    for name in ("start", "via", "goal"):
-        panels.button(f"take {name}", f"{name} = this pose", "Take the pose that the sliders have")
+    panels.group("take", "this pose is", ("start", "via", "goal"), "Take the pose that the sliders have")
     panels.choice("profile", "profile", tuple(map(str, PROFILES)), "cubic", "How the path is timed")
     panels.text("along", "along", "joint", "joint, line or arc=X,Y,Z")
     panels.text("duration", "duration [s]", "", "Nothing: the shortest that the limits allow")
@@ -170,13 +171,12 @@ def _move(panels: Panels, state: State) -> None:
     for name, label in zip(FLAGS, labels, strict=True):
         panels.flag(name, label, "Of the time-optimal profile")
     panels.button("plan", "Plan")
+    panels.group("work", "then", ("look for fixes", "stop"), "Single changes that make the move possible; stop slow work")
     panels.place("planning")
-    panels.button("stop", "Stop the work")
-    panels.button("fixes", "Look for possible fixes")
     panels.folders["fixes"] = panels.gui.add_folder("Possible fixes", visible=False)
     panels.place("command")
-    for kind, label in (_KINDS | _BESIDE).items():
-        panels.button(f"save {kind}", f"Save {label}")
+    for k in (0, 3):
+        panels.group(f"save{k}", "save", SAVED[k : k + 3], "The browser saves the file")
 
 
 def _drives(panels: Panels, state: State) -> None:

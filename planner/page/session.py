@@ -22,7 +22,7 @@ from planner.page.html import bars_html, block, css, figures_html
 from planner.page.jobs import Worker
 from planner.page.motion_view import Chart, charts, now_view, planes_view, verdict_view
 from planner.page.panels import Panels, build
-from planner.page.plans import make_plan, spec_of
+from planner.page.plans import make_plan, spec_of, text_of
 from planner.page.pose_view import pose_view
 from planner.page.state import State
 from planner.page.target_view import branches_html, workspace_html
@@ -31,6 +31,7 @@ from planner.paths.targets import parse_pitch
 from planner.progress import Track
 from planner.suggestions import Suggestion, suggestions
 
+_EYE, _LOOK_AT, _VIEW_ANGLE = (2.6, -4.4, 2.0), (0.3, 0.8, 0.3), 0.75  # [m], [m], [rad]
 _FRAME = 1.0 / 25.0  # [s] between two pictures while a motion plays
 
 
@@ -44,6 +45,7 @@ class Session:
         self._panels = build(client.gui, first, self.edit)
         self._drawing = Drawing(client.scene, first.boom)
         self._solver, self._worker = Worker(partial(self._busy, "solving")), Worker(partial(self._busy, "planning"))
+        self._closed = False
         self._playing: asyncio.Task[None] | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._extras: list[Any] = []
@@ -51,10 +53,11 @@ class Session:
         self._connect()
         with client.atomic():
             self._show(first, None)
-        client.camera.position, client.camera.look_at = (1.6, -3.6, 1.7), (0.4, 0.6, 0.4)
+        client.camera.position, client.camera.look_at, client.camera.fov = _EYE, _LOOK_AT, _VIEW_ANGLE
 
     def close(self) -> None:
         """End the work of a tab that was closed."""
+        self._closed = True
         self._solver.stop()
         self._worker.stop()
         self._halt()
@@ -63,13 +66,15 @@ class Session:
         """Change a field."""
         before = self.state
         self.apply(partial(states.edited, name=name, text=text), but=name)
-        if self.state.target != before.target:
+        if name in states.TARGET and self.state.target != before.target:
             self._solve()
         if name.startswith("drive_") and before.planned is not None and self.state.boom is not before.boom:
             self.plan()
 
     def apply(self, change: Callable[[State], State], but: str = "") -> None:
         """Change the state, and show what differs; an error of the program is said in the page and on standard error."""
+        if self._closed:
+            return
         before = self.state
         try:
             self.state = change(before)
@@ -181,6 +186,7 @@ class Session:
         if self._playing is not None:
             self._playing.cancel()
             self._playing = None
+        if not self._closed:
             self._panels.buttons["play"].label = "Play"
 
     def _start(self, work: Coroutine[Any, Any, None]) -> None:
@@ -189,6 +195,8 @@ class Session:
         task.add_done_callback(self._tasks.discard)
 
     def _busy(self, place: str, title: str, share: float | None) -> None:
+        if self._closed:
+            return
         self._panels.show(place, "" if share is None else block(f'<div role="status">{title}: {share:.0%}</div>'))
         self._client.flush()
 
@@ -229,14 +237,18 @@ class Session:
         self._drawing.show_pose(view, float(now.shown_q[0]))
         x, y, z = view.tip
         self._drawing.show_target((float(x), float(y), float(z)))
-        self._panels.show("bars", block(f"<b>Static torque of what the drive allows</b>{bars_html(view.bars)}"))
+        self._panels.show("bars", block(f"<b>Static torque, of what the drive allows</b>{bars_html(view.bars)}"))
         self._panels.show("figures", block(figures_html(view.figures)))
         self._panels.show("arrows", block(f'<div id="scale">{view.scale.sentence}; light: forces, purple: moment</div>'))
 
     def _show_motion(self, now: State, old: State | None) -> None:
         panels, planned = self._panels, now.planned
         if old is None or planned is not old.planned or now.failure != old.failure:
-            said = f'<div id="verdict" role="alert">{escape(now.failure)}</div>' if now.failure else "Plan a move under Move."
+            said = (
+                f'<div id="verdict" role="alert">not possible: {escape(now.failure)}</div>'
+                if now.failure
+                else "Plan a move under Move."
+            )
             panels.show("verdict", block(said) if planned is None else verdict_view(planned))
         if old is not None and planned is not old.planned:
             self._halt_other(planned)
@@ -282,27 +294,19 @@ class Session:
 
     def _connect(self) -> None:
         """Connect buttons, the time's slider and the gizmo with what they do."""
-        actions: dict[str, Callable[[], None]] = {
-            "plan": self.plan,
-            "stop": self._stop_work,
-            "fixes": self._look_for_fixes,
-            "play": self._play,
-            "workspace": self._map,
-            "workspace off": lambda: self.apply(lambda state: replace(state, workspace=None)),
-            "branch next": lambda: self.apply(lambda state: states.next_branch(state, 1)),
-            "branch before": lambda: self.apply(lambda state: states.next_branch(state, -1)),
+        actions: dict[str, Callable[[str], None]] = {
+            "plan": lambda _: self.plan(),
+            "play": lambda _: self._play(),
+            "pose": lambda name: self.apply(partial(states.edited, name="pose", text=name)),
+            "branch": lambda way: self.apply(partial(states.next_branch, step=1 if way == "next" else -1)),
+            "workspace": lambda way: self._map() if way == "show" else self.apply(_without_workspace),
+            "take": self._take,
+            "work": lambda what: self._stop_work() if what == "stop" else self._look_for_fixes(),
+            "save0": self._save,
+            "save3": self._save,
         }
         for name, handle in self._panels.buttons.items():
-            kind, _, rest = name.partition(" ")
-            if name in actions:
-                action = actions[name]
-            elif kind == "pose":
-                action = partial(self.apply, partial(states.edited, name="pose", text=rest))
-            elif kind == "take":
-                action = partial(self._take, rest)
-            else:
-                action = partial(self._save, rest)
-            handle.on_click(_calling(action))
+            handle.on_click(_calling(actions[name]))
 
         async def moved(event: Any) -> None:
             if event.client_id is not None:
@@ -324,7 +328,7 @@ class Session:
     def _drag(self, position: Any, phase: str) -> None:
         if phase == "update" and (self.state.target.is_quick or not self._solver.is_busy):
             x, y, z = (round(float(value), 4) + 0.0 for value in position)
-            asked = {"x": states.text_of(x), "y": states.text_of(y), "z": states.text_of(z)}
+            asked = {"x": text_of(x), "y": text_of(y), "z": text_of(z)}
 
             def change(state: State) -> State:
                 state = replace(state, asked={**state.asked, **asked}, complaints={})
@@ -340,9 +344,15 @@ class Session:
             self._client.flush()
 
 
-def _calling(action: Callable[[], None]) -> Callable[[Any], Coroutine[Any, Any, None]]:
-    async def call(_: Any) -> None:
-        action()
+def _without_workspace(state: State) -> State:
+    return replace(state, workspace=None)
+
+
+def _calling(action: Callable[[str], None]) -> Callable[[Any], Coroutine[Any, Any, None]]:
+    """Return what calls an action with the word of the button that was pressed."""
+
+    async def call(event: Any) -> None:
+        action(str(event.target.value))
 
     return call
 

@@ -26,7 +26,7 @@ from boom_model import (
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from boom_model.kinematics.constraints import parse_constraint
-from boom_model.plausible import MASS, SLOPE
+from boom_model.plausible import DURATION, MASS, SLOPE
 from boom_model.words import joint_position, number
 from planner.move_spec import MoveWords
 from planner.page.drives import fitted, supplies_of, with_drive
@@ -345,6 +345,8 @@ def _move(name: str) -> Callable[[State, str], State]:
 def _with_words(state: State) -> State:
     """Return the state with the move that its fields describe."""
     words = _words(state)
+    if words.duration is not None:
+        DURATION.require("duration", words.duration)
     for target in words.spec().targets:
         if isinstance(target, str):
             state.boom.pose(target)

@@ -25,10 +25,10 @@ def branches_html(branches: Branches | None) -> str:
     for i, solution in enumerate(found.solutions):
         mark = "shown" if i == branches.chosen else "in limits" if solution.within_limits else "outside"
         values = (fixed(value, digits) for value, digits in zip(shown(solution.q), _DIGITS, strict=True))
-        rows.append((str(i + 1), *values, mark))
+        rows.append((str(i + 1), mark, *values))
         reasons += [f"branch {i + 1}: {reason}" for reason in solution.reasons]
     units = ("deg", "deg", "deg", "m", "deg")
-    header = ("", *(f"{joint} [{unit}]" for joint, unit in zip(JOINTS, units, strict=True)), "")
+    header = ("", "", *(f"{joint} [{unit}]" for joint, unit in zip(JOINTS, units, strict=True)))
     said = "".join(f'<div style="margin-top:2px">{escape(reason)}</div>' for reason in reasons)
     return block(table_html(header, rows, "branches") + f'<div id="reasons">{said}</div>')
 
