@@ -1,7 +1,7 @@
 """Smallest single changes that make a move possible, each verified by planning again."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -34,6 +34,10 @@ class Suggestion:
     """Kind of change: payload, duration, ratio, drive, limit or order."""
     sentence: str
     """Change in words, with its value."""
+    boom: Boom = field(repr=False, compare=False)
+    """The boom with the change."""
+    spec: MoveSpec = field(repr=False, compare=False)
+    """The move with the change."""
 
 
 def suggestions(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[Suggestion, ...]:
@@ -60,7 +64,7 @@ def suggestions(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[Sugges
     Raises:
         InputError: as `plan_move`.
     """
-    spec = replace(spec, step=_TRIAL_STEP, rate=None)
+    asked, spec = spec, replace(spec, step=_TRIAL_STEP, rate=None)
     if works(boom, spec):
         return ()
     driven = [i for i, drive in enumerate(boom.drives) if drive is not None]
@@ -72,7 +76,8 @@ def suggestions(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[Sugges
         partial(_scaled, boom, spec, "limit", _faster, range(5)),
         partial(_orders, boom, spec),
     ]
-    return tuple(suggestion for kind in track(kinds) for suggestion in kind())
+    found = (suggestion for kind in track(kinds) for suggestion in kind())
+    return tuple(replace(each, spec=replace(each.spec, step=asked.step, rate=asked.rate)) for each in found)
 
 
 def works(boom: Boom, spec: MoveSpec) -> bool:
@@ -99,7 +104,7 @@ def _payload(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
         return
     rounded = float(np.floor(bisect(carries, good=0.0, bad=mass, steps=_BISECTIONS) * 10.0) / 10.0)
     if carries(rounded):
-        yield Suggestion("payload", f"a payload of {rounded:g} kg instead of {mass:g} kg")
+        yield Suggestion("payload", f"a payload of {rounded:g} kg instead of {mass:g} kg", boom.with_payload(rounded), spec)
 
 
 def _duration(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
@@ -110,8 +115,9 @@ def _duration(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
     except InfeasibleError:
         return
     rounded = float(np.ceil(least * 100.0) / 100.0)
-    if works(boom, replace(spec, duration=rounded)):
-        yield Suggestion("duration", f"a duration of {rounded:g} s instead of {spec.duration:g} s")
+    longer = replace(spec, duration=rounded)
+    if works(boom, longer):
+        yield Suggestion("duration", f"a duration of {rounded:g} s instead of {spec.duration:g} s", boom, longer)
 
 
 def _scaled(boom: Boom, spec: MoveSpec, kind: str, change: Change, joints: Sequence[int]) -> Iterator[Suggestion]:
@@ -121,12 +127,14 @@ def _scaled(boom: Boom, spec: MoveSpec, kind: str, change: Change, joints: Seque
         factor = _least_factor(spec, partial(change, boom, which))
         if factor is not None:
             found = True
-            yield Suggestion(kind, _SENTENCES[kind].format(joints=JOINTS[which[0]], factor=factor))
+            sentence = _SENTENCES[kind].format(joints=JOINTS[which[0]], factor=factor)
+            yield Suggestion(kind, sentence, change(boom, which, factor), spec)
     if not found and len(joints) > 1:
         factor = _least_factor(spec, partial(change, boom, joints))
         if factor is not None:
             names = ", ".join(JOINTS[i] for i in joints)
-            yield Suggestion(kind, _SENTENCES[kind].format(joints=names, factor=factor))
+            sentence = _SENTENCES[kind].format(joints=names, factor=factor)
+            yield Suggestion(kind, sentence, change(boom, joints, factor), spec)
 
 
 _SENTENCES = {
@@ -182,8 +190,9 @@ def _orders(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
     for name, moved_from, moved_to in (("first", a, b), ("last", b, a)):
         between = moved_from.copy()
         between[3] = moved_to[3]
-        if boom.limits.contain(between) and works(boom, replace(spec, via=(between,))):
-            yield Suggestion("order", f"move the extension {name}, separately")
+        apart = replace(spec, via=(between,))
+        if boom.limits.contain(between) and works(boom, apart):
+            yield Suggestion("order", f"move the extension {name}, separately", boom, apart)
 
 
 def _least_factor(spec: MoveSpec, changed: Callable[[float], Boom]) -> float | None:

@@ -187,7 +187,7 @@ def element_accelerations(boom: Boom, q: Array, qd: Array, qdd: Array, *base: Ar
     state = _State(*(list(np.ascontiguousarray(x.T)) for x in (q, qd, qdd)))
     (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
     plane = _plane(boom, state, *(list(x.T) for x in base))
-    return _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), boom.geometry.L7 + q[:, 3])
+    return np.asarray(_accelerations(state, plane, (c2, c3, ct), (s2, s3, st), boom.geometry.L7 + q[:, 3]))
 
 
 def element_velocities(boom: Boom, q: Array) -> Array:

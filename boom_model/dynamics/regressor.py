@@ -127,7 +127,7 @@ def body_of_pseudo_inertia(P: Array) -> Body:
 
 
 def _grouped(boom: Boom) -> Array:
-    """What each parameter adds to int g g^T dm of `newton_euler`, flattened: (121, 80)."""
+    """Return what each parameter adds to int g g^T dm of `newton_euler`, flattened: (121, 80)."""
     along_link, P = body_elements(boom), pseudo_inertia_of_parameters(np.eye(10))
     columns = []
     for name in REGRESSOR_BODIES:

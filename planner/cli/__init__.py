@@ -12,7 +12,7 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, field, files, kinematics, link, moves, require, study, view
+from planner.cli import control, data, drives, field, files, kinematics, link, moves, page, require, study, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -104,6 +104,7 @@ for _command in (
     files.compare,
     files.validate,
     view.view,
+    page.jog,
     data.info,
     data.catalogue,
     data.new,

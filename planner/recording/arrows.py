@@ -85,13 +85,21 @@ def log_arrows(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, lo
     _log_style(recording, "mount_moment", "moment", _MOMENT)
     for start in range(0, len(t), POSES_AT_ONCE):
         part = slice(start, start + POSES_AT_ONCE)
-        for name, origins, vectors in _arrows(boom, q[part], loads, part, scale):
-            arrows = rr.Arrows3D.columns(vectors=vectors, origins=origins)
-            recording.send_columns(f"world/loads/{name}", [time_column(t[part])], arrows)
+        for name, origins, vectors in arrows(boom, q[part], loads, scale, part):
+            columns = rr.Arrows3D.columns(vectors=vectors, origins=origins)
+            recording.send_columns(f"world/loads/{name}", [time_column(t[part])], columns)
 
 
-def _arrows(boom: Boom, q: Array, loads: Loads, part: slice, scale: Scale) -> Iterator[tuple[str, Array, Array]]:
-    """Yield the name, the foot (n, 3) [m] and the vector (n, 3) [m] of each arrow."""
+def arrows(boom: Boom, q: Array, loads: Loads, scale: Scale, part: slice = slice(None)) -> Iterator[tuple[str, Array, Array]]:
+    """Yield the name, the foot (n, 3) [m] and the vector (n, 3) [m] of each arrow in the frame "mount".
+
+    Args:
+        boom: the boom.
+        q: (n, 5) joint positions.
+        loads: loads with reactions, n of them in `part`.
+        scale: what a metre of arrow stands for.
+        part: samples of the loads.
+    """
     assert loads.pins is not None
     assert loads.mount is not None
     c, s = np.cos(q[:, 0]), np.sin(q[:, 0])

@@ -13,6 +13,8 @@ from boom_model.keep_out import Box, KeepOut
 from boom_model.kinematics.frames import R_LINK_BODY
 from planner.motion.vehicle import VehicleCase, base_pose
 from planner.recording.palette import COLORS, DARK, LIGHT, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, PIN_COLOR, Color
+from planner.recording.solids import PIN_LENGTH, PIN_RADIUS, Bar, corners, payload_radius, pins
+from planner.recording.solids import bars as bars_of
 from planner.recording.stream import time_column
 
 POSES_AT_ONCE = 20_000
@@ -23,7 +25,6 @@ A sample takes about 3 kB in memory and 0.5 kB in the file.
 
 SURROUNDINGS_NOTE = "Ground, vehicle and plot are drawn for display only, because the boom file does not define them."
 
-_STEEL = 7850.0  # [kg/m^3]: the payload is drawn as a steel ball
 _GROUND, _BELOW_TIP = 1.0, 0.25  # [m]
 _PLOT = (0.6, 1.8)  # [m] half the size of a plot of 1.2 by 3.6 m
 _SOIL: Color = (96, 84, 56)
@@ -89,30 +90,28 @@ def log_path(recording: rr.RecordingStream, entity: str, positions: Array, color
 
 def log_solids(recording: rr.RecordingStream, boom: Boom, *, without: str | None = None) -> None:
     """Log the solids of the boom: links except `without`, pins and payload."""
-    for name, bars in _bars(boom).items():
+    for name, bars in bars_of(boom).items():
         if name == without:
             continue
         _log_bars(recording, BOOM, name, bars, COLORS[name], "solid")
-    for name, along in _pins(boom).items():
-        centers = np.array([(e, 0.0, 0.0) for e in along]) @ R_LINK_BODY[name]
-        # A Rerun cylinder lies along z, and z of these bodies is the direction n of the pins.
-        pins = rr.Cylinders3D(centers=centers, lengths=0.16, radii=0.018, colors=PIN_COLOR, fill_mode="solid")
-        recording.log(BOOM.of(f"{name}/pins"), pins, rr.CoordinateFrame(name), static=True)
+    for name, centers in pins(boom).items():
+        # A Rerun cylinder lies along z.
+        drawn = rr.Cylinders3D(centers=centers, lengths=PIN_LENGTH, radii=PIN_RADIUS, colors=PIN_COLOR, fill_mode="solid")
+        recording.log(BOOM.of(f"{name}/pins"), drawn, rr.CoordinateFrame(name), static=True)
     if boom.payload.mass > 0.0:
-        radius = (boom.payload.mass / _STEEL * 0.75 / np.pi) ** (1.0 / 3.0)
-        ball = rr.Points3D([(0.0, 0.0, 0.0)], radii=radius, colors=PAYLOAD_COLOR)
+        ball = rr.Points3D([(0.0, 0.0, 0.0)], radii=payload_radius(boom), colors=PAYLOAD_COLOR)
         recording.log(BOOM.of("tip"), ball, rr.CoordinateFrame("tip"), static=True)
 
 
 def log_edges(recording: rr.RecordingStream, boom: Boom, place: Place, color: Color = LIMIT_COLOR) -> None:
     """Log the edges of the links only, for a boom shown together with another."""
-    for name, bars in _bars(boom).items():
+    for name, bars in bars_of(boom).items():
         _log_bars(recording, place, name, bars, color, "majorwireframe")
 
 
 def log_sticks(recording: rr.RecordingStream, boom: Boom, place: Place, color: Color) -> None:
     """Log the links as lines in one colour, for a boom among others."""
-    for name, bars in _bars(boom).items():
+    for name, bars in bars_of(boom).items():
         R = R_LINK_BODY[name]
         lines = [np.array([(bar.e[0], p, 0.0), (bar.e[1], p, 0.0)]) @ R for bar in bars for p in (sum(bar.p) / 2.0,)]
         if name in ("base", "end_effector"):  # these are upright
@@ -212,59 +211,13 @@ def boxes(low: Array, high: Array, color: Color, fill: Literal["solid", "majorwi
     return rr.Boxes3D(centers=(low + high) / 2.0, half_sizes=np.abs(high - low) / 2.0, colors=color, fill_mode=fill)
 
 
-@dataclass(frozen=True)
-class _Bar:
-    """A box along the link axes (e, p, n).
-
-    It runs from e[0] to e[1] along the link, from p[0] to p[1] across it, and over `depth` along
-    the pins [m].
-    """
-
-    e: tuple[float, float]
-    p: tuple[float, float]
-    depth: float
-
-    def low(self) -> tuple[float, float, float]:
-        return self.e[0], self.p[0], -self.depth / 2.0
-
-    def high(self) -> tuple[float, float, float]:
-        return self.e[1], self.p[1], self.depth / 2.0
-
-
 def _log_bars(
     recording: rr.RecordingStream,
     place: Place,
     body: str,
-    bars: list[_Bar],
+    bars: list[Bar],
     color: Color,
     fill: Literal["solid", "majorwireframe"],
 ) -> None:
-    low, high = (np.array([corner(bar) for bar in bars]) @ R_LINK_BODY[body] for corner in (_Bar.low, _Bar.high))
+    low, high = corners(body, bars)
     recording.log(place.of(body), boxes(low, high, color, fill), rr.CoordinateFrame(place.frame(body)), static=True)
-
-
-def _bars(boom: Boom) -> dict[str, list[_Bar]]:
-    """Return the solids of every body.
-
-    The extension is a rod. A length `grip` of it is visible when it is retracted, and the same
-    length stays inside at full stroke.
-    """
-    g, grip = boom.geometry, 0.05
-    rod = max(float(boom.limits.upper[3]) + 2.0 * grip, g.L7)
-    return {
-        "base": [_Bar((-0.09, 0.09), (0.0, g.L1 - 0.025), 0.18)],
-        "lower": [_Bar((0.0, g.L3), (-0.025, 0.025), 0.10)],
-        "inner": [_Bar((0.0, g.L9), (-0.025, 0.025), 0.06)],
-        "outer": [_Bar((0.0, g.L4), (-0.02, 0.02), 0.05)],
-        "upper": [
-            _Bar((0.0, g.L5), (-0.025, 0.025), 0.10),
-            _Bar((-g.L7 + grip, rod - g.L7), (-g.L6 - 0.03, -g.L6 + 0.03), 0.08),
-        ],
-        "extension": [_Bar((0.0, rod), (-0.018, 0.018), 0.04)],
-        "end_effector": [_Bar((-0.025, 0.025), (-0.025, g.L8), 0.14)],
-    }
-
-
-def _pins(boom: Boom) -> dict[str, tuple[float, ...]]:
-    """Return the position of each pin along its link [m]: shoulder and 6, 8 and 7, wrist."""
-    return {"lower": (0.0, boom.geometry.L3), "upper": (0.0, boom.geometry.L5), "end_effector": (0.0,)}

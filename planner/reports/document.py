@@ -75,7 +75,11 @@ def without_pictures(markdown: str) -> str:
 
 
 def write_document(
-    path: str | Path, markdown: str, pictures: Mapping[str, "Figure"], first: tuple[str, "Figure"] | None = None
+    path: str | Path,
+    markdown: str,
+    pictures: Mapping[str, "Figure"],
+    first: tuple[str, "Figure"] | None = None,
+    command: str | None = None,
 ) -> None:
     """Write a report with its pictures by title, the command line and the library versions.
 
@@ -84,9 +88,16 @@ def write_document(
         markdown: the report.
         pictures: by title, set after the report.
         first: Markdown and picture of a first page, if there is one.
+        command: the command that makes the report; None is the running one.
 
     HTML and PDF files contain their pictures. A Markdown file refers to pictures beside it, named
     FILE-1.png, FILE-2.png and so on.
+
+    Args:
+        path: the file.
+        markdown: the report.
+        pictures: figures by title.
+        command: the command that makes this report; None is the running one.
 
     Raises:
         InputError: the ending is unknown, or a file cannot be written. An existing file is left
@@ -96,7 +107,7 @@ def write_document(
     path, markdown = Path(path), without_pictures(markdown)
     drawn = {title: _png(figure) for title, figure in pictures.items()}
     lead = None if first is None else (without_pictures(first[0]), _png(first[1]))
-    made = f"Made by `{command_line()}` with {', '.join(_versions())}, Python {sys.version.split()[0]}."
+    made = f"Made by `{command or command_line()}` with {', '.join(_versions())}, Python {sys.version.split()[0]}."
     with replacing(path) as temporary:
         place = Path(temporary)
         if path.suffix == ".md":
