@@ -41,7 +41,7 @@ from boom_model.plausible import (
     WIDTH,
 )
 from boom_model.provenance import Basis, Origin, Sourced
-from boom_model.toml_file import Table, read_toml
+from boom_model.toml_file import Table, read_toml, validated
 from boom_model.words import nearest_name
 
 BOOM_FILE = Path(str(files("boom_model") / "data" / "third_generation.toml"))
@@ -291,7 +291,26 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
     """See `Boom.load`."""
     file = Path(path) if path is not None else BOOM_FILE
     table = read_toml(file, _BoomTable)
-    known = Catalogue.load().with_file(catalogue)
+    searched = CATALOGUE_FILE.name if catalogue is None else f"{CATALOGUE_FILE.name} or {catalogue}"
+    return _boom(str(file), table, Catalogue.load().with_file(catalogue), searched)
+
+
+def boom_of(data: dict[str, Any], known: Catalogue, name: str) -> Boom:
+    """The boom of a boom's file that is read already, as nested dictionaries.
+
+    Args:
+        data: what the file holds.
+        known: the drives that it may name.
+        name: of the file in messages.
+
+    Raises:
+        InputError: as `Boom.load`.
+    """
+    return _boom(name, validated(name, data, _BoomTable), known, "the catalogue")
+
+
+def _boom(file: str, table: _BoomTable, known: Catalogue, searched: str) -> Boom:
+    """The boom of a table; `searched` is where the drives were looked for, in messages."""
     joints = [getattr(table.joints, joint) for joint in JOINTS]
     g = table.geometry
     limits = _limits(joints, table.linkage)
@@ -309,10 +328,10 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
         mount=Mount(_given(table.mount.force_N), _given(table.mount.moment_Nm)),
         limits=limits,
         drives=tuple(
-            _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), known, catalogue)
+            _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), known, searched)
             for name, joint in zip(JOINTS, joints, strict=True)
         ),
-        actuator=_linear_drive(file, table.joints.extension.actuator, known, catalogue),
+        actuator=_linear_drive(file, table.joints.extension.actuator, known, searched),
         poses=MappingProxyType(poses),
         keep_out=None if table.keep_out is None else _keep_out(table.keep_out),
     )
@@ -359,11 +378,11 @@ def _limits(joints: list[Any], linkage: _LinkageTable) -> Limits:
     )
 
 
-def _drive(file: Path, key: str, table: _DriveTable | None, known: Catalogue, catalogue: str | Path | None) -> Drive | None:
+def _drive(file: str, key: str, table: _DriveTable | None, known: Catalogue, searched: str) -> Drive | None:
     if table is None:
         return None
     for kind, name, entries in (("motor", table.motor, known.motors), ("gearbox", table.gearbox, known.gearboxes)):
-        _complain_unless_known(f"{file}: key {key}.{kind}", name, entries, catalogue)
+        _complain_unless_known(f"{file}: key {key}.{kind}", name, entries, searched)
     motor = known.motors[table.motor]
     voltage = table.bus_voltage_V
     if voltage is not None and motor.max_voltage is not None and voltage.value > motor.max_voltage:
@@ -380,18 +399,15 @@ def _drive(file: Path, key: str, table: _DriveTable | None, known: Catalogue, ca
     )
 
 
-def _linear_drive(
-    file: Path, table: _ActuatorTable | None, known: Catalogue, catalogue: str | Path | None
-) -> LinearDrive | None:
+def _linear_drive(file: str, table: _ActuatorTable | None, known: Catalogue, searched: str) -> LinearDrive | None:
     if table is None:
         return None
-    _complain_unless_known(f"{file}: key joints.extension.actuator.model", table.model, known.actuators, catalogue)
+    _complain_unless_known(f"{file}: key joints.extension.actuator.model", table.model, known.actuators, searched)
     return LinearDrive(known.actuators[table.model], _given(table.brake))
 
 
-def _complain_unless_known(where: str, name: str, entries: Mapping[str, object], catalogue: str | Path | None) -> None:
+def _complain_unless_known(where: str, name: str, entries: Mapping[str, object], searched: str) -> None:
     if name not in entries:
-        searched = CATALOGUE_FILE.name if catalogue is None else f"{CATALOGUE_FILE.name} or {catalogue}"
         meant = nearest_name(name, entries)
         hint = "" if meant is None else f"; did you mean {meant}?"
         raise InputError(f"{where}: {name!r} is not in {searched} ({', '.join(entries) or 'none'}){hint}")

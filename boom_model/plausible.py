@@ -99,6 +99,8 @@ TIME = Range(-1e9, 1e11, "s")
 MOTION = Range(-1e9, 1e9, "")
 """A sample's position, velocity or acceleration of a joint, and its torque."""
 RATE = Range(1e-2, 1e6, "Hz")
+FREQUENCY = Range(1e-2, 1e4, "Hz")
+"""First natural frequency of the arm."""
 WINDOW = Range(1e-6, 1e5, "s")
 """Of a filter."""
 LIFE = Range(1e-3, 1e7, "h")

@@ -2,7 +2,7 @@
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
@@ -30,18 +30,35 @@ def read_toml(path: Path, schema: type[Schema]) -> Schema:
         InputError: the file cannot be read, is not TOML, or does not match the schema; the message
             names every wrong key.
     """
+    return validated(str(path), parse_toml(path), schema)
+
+
+def parse_toml(path: Path) -> dict[str, Any]:
+    """The file as nested dictionaries, held to no schema.
+
+    Raises:
+        InputError: the file cannot be read, or is not TOML.
+    """
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError as error:  # not TOML, not UTF-8, or an integer of thousands of digits
         raise InputError(f"{path}: not valid TOML: {error}") from None
     except RecursionError:
         raise InputError(f"{path}: not valid TOML: arrays or tables are nested too deep") from None
+
+
+def validated(name: str, data: dict[str, Any], schema: type[Schema]) -> Schema:
+    """Nested dictionaries as an instance of `schema`; `name` is of the file in messages.
+
+    Raises:
+        InputError: the data breaks the schema; every offending key is named.
+    """
     try:
         return schema.model_validate(data)
     except ValidationError as error:
-        raise InputError(f"{path}: " + "; ".join(_sentence(e) for e in error.errors())) from None
+        raise InputError(f"{name}: " + "; ".join(_sentence(e) for e in error.errors())) from None
 
 
 def _sentence(error: ErrorDetails) -> str:

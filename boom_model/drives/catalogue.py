@@ -9,7 +9,7 @@ from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -41,7 +41,7 @@ from boom_model.plausible import (
     TORQUE,
     VOLTAGE,
 )
-from boom_model.toml_file import Table, read_toml
+from boom_model.toml_file import Table, parse_toml, validated
 
 CATALOGUE_FILE = Path(str(files("boom_model") / "data" / "catalogue.toml"))
 
@@ -65,7 +65,17 @@ class Catalogue:
         Raises:
             InputError: the file cannot be read or is malformed; the message names file and key.
         """
-        table = read_toml(Path(path) if path is not None else CATALOGUE_FILE, _CatalogueTable)
+        file = Path(path) if path is not None else CATALOGUE_FILE
+        return Catalogue.of(parse_toml(file), str(file))
+
+    @staticmethod
+    def of(data: dict[str, Any], name: str) -> "Catalogue":
+        """Return the catalogue of a file that is read already; `name` is of the file in messages.
+
+        Raises:
+            InputError: as `load`.
+        """
+        table = validated(name, data, _CatalogueTable)
         return Catalogue(
             motors=MappingProxyType({name: _motor(name, t) for name, t in table.motors.items()}),
             gearboxes=MappingProxyType({name: _gearbox(name, t) for name, t in table.gearboxes.items()}),

@@ -18,7 +18,7 @@ from boom_model.link_design.beam import Beam, Support
 from boom_model.link_design.materials import Material
 from boom_model.plausible import MASS, THICKNESS, WIDTH
 from boom_model.provenance import Basis, Origin
-from boom_model.toml_file import Table, read_toml
+from boom_model.toml_file import Table, parse_toml, validated
 from boom_model.words import unknown
 
 LINKS_FILE = Path(str(files("boom_model") / "data" / "links.toml"))
@@ -96,7 +96,16 @@ def load_link(boom: Boom, name: str, path: str | Path | None = None) -> Link:
             do not fit. The message names the key.
     """
     file = LINKS_FILE if path is None else Path(path)
-    table = read_toml(file, _LinksTable).links
+    return link_of(boom, name, parse_toml(file), str(file))
+
+
+def link_of(boom: Boom, name: str, data: dict[str, Any], file: str) -> Link:
+    """Return a link of a links' file that is read already; `file` is its name in messages.
+
+    Raises:
+        InputError: as `load_link`.
+    """
+    table = validated(file, data, _LinksTable).links
     if name not in LINKS or name not in table:
         raise unknown("link", name, (each for each in LINKS if each in table))
     g, t = boom.geometry, table[name]

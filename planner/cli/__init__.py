@@ -12,7 +12,7 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, files, kinematics, link, moves, view
+from planner.cli import control, data, drives, field, files, kinematics, link, moves, require, study, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -93,7 +93,11 @@ for _command in (
     kinematics.reach,
     drives.mission,
     drives.size,
+    require.require,
+    study.study,
     control.control,
+    field.geotag,
+    field.plots,
     link.link,
     files.export,
     files.export_model,

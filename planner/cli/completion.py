@@ -106,3 +106,10 @@ def vehicles(_: click.Context, __: click.Parameter, incomplete: str) -> list[Com
     from planner.motion.vehicle import named_cases
 
     return _items(named_cases(), incomplete) or _files(incomplete)
+
+
+def studies(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a study, or of a file of one."""
+    from planner.studies.study import named_studies
+
+    return _items(named_studies(), incomplete) or _files(incomplete)

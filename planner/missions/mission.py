@@ -11,7 +11,7 @@ from functools import cached_property
 from importlib.resources import files
 from itertools import islice
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -21,7 +21,7 @@ from boom_model.arrays import Array, read_only
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import parse_constraint
 from boom_model.plausible import DURATION, LIFE, TIP_TOLERANCE
-from boom_model.toml_file import Table, read_toml
+from boom_model.toml_file import Table, parse_toml, validated
 from planner.checks.drives.duty import Duty
 from planner.files import named_file
 from planner.motion.trajectory import STEP, Trajectory
@@ -135,7 +135,26 @@ def load_mission(name: str) -> Mission:
         InputError: the mission is unknown, or the file cannot be read or is malformed; the message
             names the key.
     """
-    table = read_toml(named_file(_FOLDER, name, "mission"), _MissionTable)
+    file = mission_file(name)
+    return mission_of(parse_toml(file), str(file))
+
+
+def mission_file(name: str) -> Path:
+    """Return the file of a named mission, or the file that is named.
+
+    Raises:
+        InputError: the mission is unknown.
+    """
+    return named_file(_FOLDER, name, "mission")
+
+
+def mission_of(data: dict[str, Any], name: str) -> Mission:
+    """Return the mission of a file that is read already; `name` is of the file in messages.
+
+    Raises:
+        InputError: as `load_mission`.
+    """
+    table = validated(name, data, _MissionTable)
     return Mission(table.name, Origin(Basis(table.basis), table.source), table)
 
 

@@ -230,43 +230,39 @@ class Side:
 
     def smoothed(self, theta2: Array, wish: Array, weight: float, lower: Array, upper: Array) -> Array:
         """Return the curve theta2 (NODES,) in the corridor of least objective (see the module)."""
+        from scipy.linalg import solveh_banded
+
         scale = 0.1  # [rad] a departure that counts as much as reaching a limit
         x = np.clip(theta2, lower, upper)
         T = float(durations(self.boom, self.curve(x)).max())
         rows = _rows(self.boom, T)
 
-        def value(x: Array) -> tuple[float, Array]:
+        def value(x: Array) -> tuple[float, list[Array]]:
             q = self.curve(x)
-            residual = np.concatenate([(D @ q) / limit for D, limit in rows])
-            return float((residual**2).sum()) / NODES + weight * float((((x - wish) / scale) ** 2).mean()), residual
+            residuals = [np.diff(q, len(stencil) - 1, axis=0) * stencil[-1] / limit for stencil, limit in rows]
+            squares = sum(float((residual**2).sum()) for residual in residuals)
+            return squares / NODES + weight * float((((x - wish) / scale) ** 2).mean()), residuals
 
-        now, residual = value(x)
+        now, residuals = value(x)
         for _ in range(_NEWTON_STEPS):
             h = 1e-6
             slope = (self.curve(x + h) - self.curve(x - h)) / (2.0 * h)
-            H = np.zeros((NODES, NODES))
-            gradient = 2.0 * weight * (x - wish) / scale**2 / NODES
-            start = 0
-            for D, limit in rows:
-                part = residual[start : start + len(D)]
-                start += len(D)
-                for j in range(5):
-                    J = D * (slope[:, j] / limit[j])
-                    H += 2.0 / NODES * (J.T @ J)
-                    gradient = gradient + 2.0 / NODES * (J.T @ part[:, j])
-            H[np.diag_indices(NODES)] += 2.0 * weight / scale**2 / NODES + 1e-12 * np.trace(H)
+            H, gradient = _normal_equations(rows, slope, residuals)
+            gradient += 2.0 * weight * (x - wish) / scale**2 / NODES
+            H[-1] += 2.0 * weight / scale**2 / NODES + 1e-12 * H[-1].sum()
             barred = ((x <= lower) & (gradient > 0.0)) | ((x >= upper) & (gradient < 0.0))
-            free = np.flatnonzero(~barred)
-            if free.size == 0:
+            if barred.all():
                 break
-            step = np.zeros(NODES)
-            step[free] = -np.linalg.solve(H[np.ix_(free, free)], gradient[free])
+            for d in range(1, len(H)):
+                H[-1 - d, d:][barred[d:] | barred[:-d]] = 0.0
+            H[-1][barred] = 1.0
+            step = -solveh_banded(H, np.where(barred, 0.0, gradient))
             before, length = now, 1.0
             while length > 1e-4:
                 tried = np.clip(x + length * step, lower, upper)
                 new, fresh = value(tried)
                 if np.isfinite(new) and new < now:
-                    x, now, residual = tried, new, fresh
+                    x, now, residuals = tried, new, fresh
                     break
                 length /= 2.0
             if before - now <= 1e-6 * before:
@@ -275,10 +271,32 @@ class Side:
 
 
 def _rows(boom: Boom, T: float) -> list[tuple[Array, Array]]:
-    """Return difference matrices of three derivatives, each with its limits at duration T."""
+    """Return the difference stencils of three derivatives, each with its limits (5,) at duration T."""
     limits = boom.limits
-    D1, D2, D3 = (np.diff(np.eye(NODES), order, axis=0) * (NODES - 1.0) ** order for order in (1, 2, 3))
-    return [(D1, limits.velocity * T), (D2, limits.acceleration * T**2), (D3, limits.jerk * T**3)]
+    stencils = [np.diff(np.eye(order + 1), order, axis=0)[0] * (NODES - 1.0) ** order for order in (1, 2, 3)]
+    return list(zip(stencils, (limits.velocity * T, limits.acceleration * T**2, limits.jerk * T**3), strict=True))
+
+
+def _normal_equations(rows: list[tuple[Array, Array]], slope: Array, residuals: list[Array]) -> tuple[Array, Array]:
+    """Return H = 2 J'J / NODES and the gradient 2 J'r / NODES of the sum of squared residuals.
+
+    Args:
+        rows: stencils and limits, of `_rows`.
+        slope: (NODES, 5) derivative of the joint positions in theta2.
+        residuals: (NODES - order, 5) of each stencil.
+
+    Returns:
+        H in the upper form of `scipy.linalg.solveh_banded`, (4, NODES), and the gradient (NODES,).
+    """
+    H, gradient = np.zeros((len(rows) + 1, NODES)), np.zeros(NODES)
+    for (stencil, limit), residual in zip(rows, residuals, strict=True):
+        scaled, count = slope / limit, len(residual)
+        for m, c in enumerate(stencil):
+            here = scaled[m : m + count]
+            gradient[m : m + count] += c * (here * residual).sum(axis=-1)
+            for d, other in enumerate(stencil[m:]):
+                H[-1 - d, m + d : m + d + count] += c * other * (here * scaled[m + d : m + d + count]).sum(axis=-1)
+    return 2.0 / NODES * H, 2.0 / NODES * gradient
 
 
 def durations(boom: Boom, q: Array) -> Array:

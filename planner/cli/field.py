@@ -1,0 +1,250 @@
+"""In the field: geotags of a sensor's measurements, plot maps, row scans."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from boom_model import InputError
+from boom_model.plausible import Range
+from planner.cli.completion import OutFile
+from planner.cli.options import all_option, boom_option, json_option, load_boom, outputs, payload_option, plausible
+from planner.cli.printing import print_files, print_json, print_lines, print_rows
+
+if TYPE_CHECKING:
+    from planner.field.plots import Located, PlotMap
+    from planner.field.sensor_tags import SensorTags
+
+_EPSG = Range(1024, 999_999, "")
+_GAP = Range(1e-3, 1e4, "s")
+_SURE = 0.95
+_FEW = 3
+
+_epsg_option = click.option(
+    "--epsg", type=int, callback=plausible(_EPSG), metavar="CODE", help="Reference system of eastings and northings read."
+)
+
+
+@click.command()
+@click.argument("vehicle", metavar="VEHICLE")
+@click.argument("joints", metavar="JOINTS.csv")
+@click.argument("triggers", metavar="TRIGGERS.csv")
+@click.option("--rig", required=True, type=click.Path(), metavar="RIG.toml", help="What stands where on the vehicle.")
+@click.option("--plots", type=click.Path(), metavar="MAP", help="Plot map: which plot was seen, and how probably.")
+@click.option("--out", type=OutFile(".csv"), metavar="FILE.csv", help="The tags as a table.")
+@click.option("--geojson", type=OutFile(".geojson", ".json"), metavar="FILE.geojson", help="The tags for QGIS.")
+@click.option(
+    "--to-epsg", type=int, callback=plausible(_EPSG), metavar="CODE", help="Reference system written; default: the UTM zone."
+)
+@click.option("--gap", type=float, callback=plausible(_GAP), metavar="S", help="Longest gap to bridge; default: 3 intervals.")
+@_epsg_option
+@payload_option
+@boom_option
+@all_option
+@json_option
+def geotag(
+    vehicle: str,
+    joints: str,
+    triggers: str,
+    rig: str,
+    plots: str | None,
+    out: str | None,
+    geojson: str | None,
+    to_epsg: int | None,
+    gap: float | None,
+    epsg: int | None,
+    payload: float | None,
+    boom_file: str | None,
+    whole: bool,
+    as_json: bool,
+) -> int:
+    """Say where the sensor at the boom's end was at every trigger, what it saw, and how sure that is.
+
+    VEHICLE is CSV or NMEA: time, position, attitude and their deviations. JOINTS has a time and q1..q5.
+    A time is `utc`, `gps_s`, or `t` of one clock for all. Angles: heading clockwise from true north,
+    pitch nose up, roll right side down.
+
+    \b
+    Example:
+      boom geotag vehicle.csv joints.csv triggers.csv --rig rig.toml --plots trial.toml --out tags.csv
+    """
+    from planner.field.log_files import read_joint_log, read_triggers, read_vehicle_log
+    from planner.field.plot_files import read_plots
+    from planner.field.rig import read_rig
+    from planner.field.sensor_tags import tag_sensor
+    from planner.field.tag_files import rows_of, write_csv, write_geojson
+
+    files = outputs(out, geojson, inputs=(vehicle, joints, triggers, rig, plots, boom_file))
+    boom = load_boom(boom_file, payload)
+    log = read_vehicle_log(vehicle, epsg, gap)
+    tags = tag_sensor(boom, read_rig(rig), log, read_joint_log(joints), read_triggers(triggers))
+    field = None if plots is None else _map_at(read_plots(plots, None), tags)
+    located = None if field is None else _located(field, tags)
+    code = _zone(tags) if to_epsg is None else to_epsg
+    rows = rows_of(tags, code, field, located)
+    with files:
+        if out is not None:
+            write_csv(files.temporary(out), rows)
+        if geojson is not None:
+            write_geojson(files.temporary(geojson), tags, rows)
+    written = {kind: name for kind, name in (("tags", out), ("map", geojson)) if name is not None}
+    if as_json:
+        print_json({"tags": rows, "epsg": code, "warnings": tags.warnings, "notes": _notes(tags, field), "files": written})
+        return 0
+    _print_tags(tags, field, located, whole)
+    print_files(written)
+    print_lines("next", [] if out else [f"boom geotag {vehicle} {joints} {triggers} --rig {rig} --out tags.csv"])
+    return 0
+
+
+@click.command()
+@click.argument("source", metavar="MAP")
+@click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="Write .geojson, .shp or .csv.")
+@click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Draw the map.")
+@click.option("--at", "points", multiple=True, metavar="LAT,LON", help="Which plot a point is on; may be given again.")
+@click.option("--std", type=float, default=0.0, callback=plausible(Range(0.0, 100.0, "m")), metavar="M",
+              help="Standard deviation of those points.")  # fmt: skip
+@_epsg_option
+@all_option
+@json_option
+def plots(
+    source: str,
+    out: str | None,
+    picture: str | None,
+    points: tuple[str, ...],
+    std: float,
+    epsg: int | None,
+    whole: bool,
+    as_json: bool,
+) -> int:
+    """Make a plot map from the corners of a trial, or read one; write it, draw it, ask it.
+
+    MAP is a trial's .toml, .geojson, .shp, or a .csv with a column wkt.
+
+    \b
+    Example:
+      boom plots trial.toml --out plots.geojson --picture plots.png --at 52.13,-106.62 --std 0.05
+    """
+    from planner.field.plot_files import read_plots, write_plots
+    from planner.field.plot_picture import write_picture
+    from planner.field.plots import locate
+
+    files = outputs(out, picture, inputs=(source,))
+    field = read_plots(source, epsg)
+    places = np.radians([_place(text) for text in points]).reshape(-1, 2)
+    spots = field.plane(places[:, 0], places[:, 1])
+    located = locate(field, spots, np.tile(np.eye(2) * std**2, (len(spots), 1, 1)))
+    with files:
+        if out is not None:
+            write_plots(field, files.temporary(out))
+        if picture is not None:
+            write_picture(files.temporary(picture), field, spots)
+    written = {kind: name for kind, name in (("plots", out), ("picture", picture)) if name is not None}
+    on = [field.names[k] if k >= 0 else None for k in located.plot]
+    if as_json:
+        asked = [
+            {"point": text, "plot": name, "probability": float(p)}
+            for text, name, p in zip(points, on, located.probability, strict=True)
+        ]
+        print_json({**_map_json(field), "points": asked, "files": written})
+        return 0
+    _print_map(field, whole)
+    if points:
+        rows = [(text, name or "none", f"{p:.3f}") for text, name, p in zip(points, on, located.probability, strict=True)]
+        print_rows(("point", "plot", "probability"), rows)
+    print_lines("note", field.notes)
+    print_files(written)
+    print_lines("next", [] if out else [f"boom plots {source} --out plots.geojson --picture plots.png"])
+    return 0
+
+
+def _map_at(field: "PlotMap", tags: "SensorTags") -> "PlotMap":
+    """The map with its ground at the height of what was seen, checked to be where the log is."""
+    from planner.field.plots import require_near
+
+    latitude, longitude, height = tags.seen.geodetic
+    require_near(field, *tags.sensor.geodetic[:2], tags.triggers.source)
+    known = np.isfinite(latitude) & np.isfinite(longitude)
+    return field.at_height(float(np.median(height[known]))) if known.any() else field
+
+
+def _located(field: "PlotMap", tags: "SensorTags") -> "Located":
+    from planner.field.plots import locate
+
+    spots = np.full((len(tags.triggers.t), 2), np.nan)
+    known = np.isfinite(tags.seen.ecef).all(axis=-1)
+    if known.any():
+        spots[known] = field.plane_of(tags.seen.ecef[known])
+    return locate(field, spots, tags.seen.covariance[:, :2, :2])
+
+
+def _zone(tags: "SensorTags") -> int:
+    from planner.field.earth import utm_zone
+
+    latitude, longitude, _ = tags.sensor.geodetic
+    first = int(np.argmax(tags.known))
+    return utm_zone(float(latitude[first]), float(longitude[first]))
+
+
+def _notes(tags: "SensorTags", field: "PlotMap | None") -> list[str]:
+    return [*tags.notes, *(() if field is None else field.notes)]
+
+
+def _print_tags(tags: "SensorTags", field: "PlotMap | None", located: "Located | None", whole: bool) -> None:
+    n, known = len(tags.triggers.t), tags.known
+    print_lines(None, [f"{tags.triggers.source}: {n} triggers, {known.sum()} tagged"])
+    rows = []
+    for name, each in (("sensor", tags.sensor), ("what it saw", tags.seen)):
+        at = np.isfinite(each.ecef).all(axis=-1)
+        if not at.any():
+            continue
+        std = np.sqrt(np.diagonal(each.covariance[at], axis1=1, axis2=2))
+        long = each.ellipses[at, 0]
+        worst = [f"{figure * 1e3:.0f} mm" for figure in (np.median(long), np.max(long))]
+        rows.append((name, *(f"{np.median(s) * 1e3:.0f} mm" for s in std.T), *worst))
+    print_rows(("", "std east", "north", "up", "95 % ellipse", "worst"), rows)
+    print_lines(None, [f"sag by the gearboxes: {np.nanmedian(-tags.sag[:, 2]) * 1e3:.1f} mm (median), counted in"])
+    if field is not None and located is not None:
+        sure = int((located.probability >= _SURE).sum())
+        plots = len(set(located.plot[located.plot >= 0]))
+        on = int((located.plot >= 0).sum())
+        print_lines(
+            None, [f"{on} spots on {plots} of {len(field.names)} plots, {sure} with a probability of {_SURE:g} or more"]
+        )
+        print_lines(None, [f"{int(known.sum()) - on} spots on no plot"] if on < known.sum() else [])
+    lost = [f"{tags.triggers.labels[k]}: {tags.sensor.reasons[k]}" for k in np.flatnonzero(~known)]
+    for title, lines in (("WARN", tags.warnings), ("no tag", lost)):
+        print_lines(title, lines if whole else lines[:_FEW])
+        print_lines(title, [f"{len(lines) - _FEW} more: --all lists them"] if len(lines) > _FEW and not whole else [])
+    notes = _notes(tags, field)
+    print_lines("note", notes if whole else [f"{len(notes)} notes and assumptions: --all lists them"])
+
+
+def _print_map(field: "PlotMap", whole: bool) -> None:
+    grid = [(r, c) for r, c in zip(field.rows, field.ranges, strict=True) if r is not None and c is not None]
+    size = f", {len({r for r, _ in grid})} rows x {len({c for _, c in grid})} ranges" if grid else ""
+    print_lines(None, [f"{field.source}: {len(field.names)} plots{size}, {field.area():.1f} m^2"])
+    latitude, longitude = np.degrees([field.frame.latitude, field.frame.longitude])
+    print_lines(None, [f"middle at {latitude:.7f}, {longitude:.7f} deg"])
+    listed = list(zip(field.names, field.polygons, strict=True))
+    rows = [(name, f"{p.area:.3f} m^2", f"{p.centroid.x:.2f}", f"{p.centroid.y:.2f}") for name, p in listed]
+    print_rows(("plot", "area", "east of middle", "north"), rows if whole else rows[:_FEW])
+    print_lines(None, [f"{len(rows) - _FEW} more plots: --all lists them"] if len(rows) > _FEW and not whole else [])
+
+
+def _map_json(field: "PlotMap") -> dict[str, Any]:
+    plots = [
+        {"plot": name, "row": row, "range": rank, "area_m2": float(polygon.area)}
+        for name, row, rank, polygon in zip(field.names, field.rows, field.ranges, field.polygons, strict=True)
+    ]
+    return {"plots": plots, "latitude_rad": field.frame.latitude, "longitude_rad": field.frame.longitude, "notes": field.notes}
+
+
+def _place(text: str) -> tuple[float, float]:
+    """Latitude and longitude [deg] of LAT,LON."""
+    from boom_model.words import numbers
+
+    latitude, longitude = numbers(text, text, 2)
+    if abs(latitude) > 90.0:
+        raise InputError(f"{text!r}: latitude is {latitude:g} deg; it must be between -90 and 90 deg")
+    return latitude, longitude

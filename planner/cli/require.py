@@ -1,0 +1,140 @@
+"""What a mission requires of the drives: the sheet that one sends to a supplier."""
+
+from typing import Any
+
+import click
+
+from boom_model.plausible import FREQUENCY, TIP_TOLERANCE
+from planner.cli.completion import OutFile, joints, missions
+from planner.cli.options import (
+    all_option,
+    boom_option,
+    json_option,
+    load_boom,
+    load_vehicle,
+    outputs,
+    payload_as_option,
+    payload_option,
+    plausible,
+    report_option,
+    vehicle_option,
+)
+from planner.cli.printing import print_files, print_json, print_lines, print_rows, tracked
+
+
+@click.command()
+@click.argument("mission", default="field-day", shell_complete=missions)
+@click.option(
+    "--joint",
+    "joints",
+    multiple=True,
+    shell_complete=joints,
+    help="A sheet of this joint; may be given again; else of every one.",
+)
+@click.option("--frequency", type=float, default=8.0, show_default=True, callback=plausible(FREQUENCY), metavar="HZ",
+              help="First frequency that the stiffnesses must give.")  # fmt: skip
+@click.option("--tip-error", type=float, callback=plausible(TIP_TOLERANCE), metavar="MM",
+              help="Error of the tip through backlash; otherwise the mission's tip_tolerance_mm.")  # fmt: skip
+@click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Torque over speed of every joint, with its hull.")
+@payload_option
+@payload_as_option
+@vehicle_option
+@report_option
+@boom_option
+@all_option
+@json_option
+def require(
+    mission: str,
+    joints: tuple[str, ...],
+    frequency: float,
+    tip_error: float | None,
+    picture: str | None,
+    payload: float | None,
+    payload_as: Any,
+    vehicle: str | None,
+    document: str | None,
+    boom_file: str | None,
+    whole: bool,
+    as_json: bool,
+) -> int:
+    """What the drive of each joint must give on a mission, with a drive or without: the sheet for a supplier.
+
+    MISSION is a FILE.toml, or one of field-day, table-2-4 and table-3-1.
+
+    \b
+    Examples:
+      boom require field-day --report sheet.pdf
+      boom require field-day --joint yaw --tip-error 5 --picture yaw.png
+    """
+    from boom_model import JOINTS
+    from planner.missions.mission import load_mission, plan_cycle
+    from planner.reports.report import assumptions
+    from planner.sizing.requirement import requirements
+    from planner.sizing.requirement_tables import requirement_markdown, requirement_notes
+
+    boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
+    files = outputs(picture, document=document, inputs=(mission, boom_file, vehicle))
+    asked = load_mission(mission)
+    cycle = plan_cycle(boom, asked, case, track=tracked("planning the mission"))
+    needs = requirements(
+        boom,
+        cycle,
+        joints or JOINTS,
+        frequency=frequency,
+        tip_error=None if tip_error is None else tip_error * 1e-3,
+        payload_as=payload_as,
+        vehicle=case,
+    )
+    title = f"mission {asked.name}, payload {boom.payload.mass:g} kg"
+    notes, assumed = requirement_notes(needs), (*asked.assumptions, *assumptions(boom, asked.jerk_limited))
+    text = requirement_markdown(f"Required of the drives: {title}", needs, notes, assumed)
+    written = _write(files, needs, text, picture, document)
+    if as_json:
+        _print_json(asked.name, needs, notes, assumed, written)
+    else:
+        print_lines(None, [f"{title}: required at the joint of each drive"])
+        _print_sheet(needs, notes, assumed, whole)
+        print_files(written)
+        print_lines("next", [] if whole or document else [f"boom require {mission} --report sheet.pdf"])
+    return 0
+
+
+def _write(files: Any, needs: Any, text: str, picture: str | None, document: str | None) -> dict[str, str]:
+    """Write the report and the picture; return what was written, by kind."""
+    from planner.reports.document import write_document
+    from planner.sizing.requirement_pictures import requirement_pictures
+
+    written: dict[str, str] = {}
+    with files:
+        drawn = requirement_pictures(needs) if picture or document else {}
+        if document is not None:
+            write_document(files.temporary(document), text, drawn)
+            written["report"] = document
+        if picture is not None:
+            (figure,) = drawn.values()
+            figure.savefig(files.temporary(picture), format="png")
+            written["picture"] = picture
+    return written
+
+
+def _print_sheet(needs: Any, notes: Any, assumed: Any, whole: bool) -> None:
+    from planner.sizing.requirement_tables import SHEET, STEP_HEADER, items, sheet_rows, step_rows
+
+    print_rows(SHEET, sheet_rows(needs), drop=("starts", "drive", "inertia"))
+    if not whole:
+        count = f"{len(notes)} notes, {len(assumed)} assumed figures"
+        print_lines(None, [f"torque-speed table, stiffness, reflected inertia, life, {count}: --all lists them"])
+        return
+    for need in needs:
+        print_lines(None, [need.joint])
+        print_rows(("required", "value"), items(need))
+        print_rows(STEP_HEADER, step_rows(need))
+    print_lines("note", notes)
+    print_lines("assumed", assumed)
+
+
+def _print_json(name: str, needs: Any, notes: Any, assumed: Any, written: dict[str, str]) -> None:
+    from planner.sizing.requirement_tables import requirement_json
+
+    sheets = [requirement_json(need) for need in needs]
+    print_json({"mission": name, "joints": sheets, "notes": list(notes), "assumptions": list(assumed), "files": written})

@@ -1,0 +1,1 @@
+"""In the field: geotags of measurements, plot maps, and row scans."""

@@ -1,0 +1,190 @@
+"""Results of a study as text, Markdown and JSON."""
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from planner.reports.markdown import section, table
+from planner.studies.analysis import CONFIDENCE, FAILS, Index, Probability, ResponseSummary, Results
+from planner.studies.designs import DesignKind
+from planner.studies.sample import INFEASIBLE, REFUSED
+from planner.studies.tables import Value
+
+RESPONSE_HEADER = ("response", "nominal", "5 %", "median", "95 %", "sd", "first order", "decided by")
+INDEX_HEADER = ("factor", "share alone", "+-", "share in all", "+-", "values")
+LEVEL_HEADER = ("factor", "level", "FAIL", "95 % interval", "samples")
+_FEW = 12
+
+
+def sentences(results: Results) -> tuple[str, ...]:
+    """Return what was asked, and the answer in words."""
+    study, found = results.study, results.fails()
+    asked = f"study {study.name}: {study.question}"
+    design = study.design
+    drawn = f"{len(results.refused):,} samples of {len(design.factors)} factors ({design.kind}, seed {study.seed})"
+    how = f"{study.work}, {drawn}"
+    counted = [
+        f"{int(mask.sum())} {word}" for mask, word in ((results.infeasible, "without a motion"), (results.refused, "refused"))
+    ]
+    if found is None:
+        return asked, how, f"no sample could be checked; {', '.join(counted)}"
+    if study.design.kind is DesignKind.GRID:
+        answer = f"{found.fails} of {found.samples} FAIL; {', '.join(counted)}"
+    else:
+        answer = f"FAIL: {chance(found)}; {', '.join(counted)}"
+    return asked, how, answer
+
+
+def chance(found: Probability) -> str:
+    """Return a probability with its interval in words."""
+    return (
+        f"{percent(found.estimate)} of {found.samples:,} "
+        f"({CONFIDENCE:.0%} interval {percent(found.low)} to {percent(found.high)})"
+    )
+
+
+def percent(share: float) -> str:
+    """Return a share as a percentage of two digits or more."""
+    return f"{100.0 * share:.3g} %" if abs(share) < 0.995 else f"{100.0 * share:.4g} %"
+
+
+def summaries(results: Results) -> tuple[ResponseSummary, ...]:
+    """Return the summaries of the study's responses that some sample has."""
+    return tuple(found for name in results.study.responses if (found := results.summary(name)) is not None)
+
+
+def response_rows(found: Sequence[ResponseSummary]) -> list[tuple[str, ...]]:
+    """Return the rows of RESPONSE_HEADER."""
+    return [
+        (
+            each.name,
+            "-" if each.nominal is None else _number(each.nominal),
+            *(_number(q) for q in each.quantiles),
+            _number(each.deviation),
+            "-" if each.first_order is None else _number(each.first_order),
+            decided_by(each),
+        )
+        for each in found
+    ]
+
+
+def decided_by(found: ResponseSummary) -> str:
+    """Return the factor that decides a response, with its share of the variance."""
+    if found.indices:
+        first = found.indices[0]
+        return f"{first.factor} ({percent(first.rank)})"
+    varying = [swing for swing in found.swings if swing.high > swing.low]
+    return varying[0].factor if varying else "-"
+
+
+def index_rows(results: Results, indices: Sequence[Index]) -> list[tuple[str, ...]]:
+    """Return the rows of INDEX_HEADER."""
+    laws = {factor.name: factor.law for factor in results.study.design.factors}
+    return [
+        (
+            index.factor,
+            f"{index.first:.3f}",
+            f"{index.first_error:.3f}",
+            "-" if index.total is None else f"{index.total:.3f}",
+            "-" if index.total_error is None else f"{index.total_error:.3f}",
+            laws[index.factor],
+        )
+        for index in indices
+    ]
+
+
+def level_rows(results: Results) -> list[tuple[str, ...]]:
+    """Return the rows of LEVEL_HEADER, for factors of few levels."""
+    few = {factor.name for factor in results.study.design.factors if len(factor.levels) <= _FEW}
+    return [
+        (name, level, percent(found.estimate), f"{percent(found.low)} to {percent(found.high)}", f"{found.samples:,}")
+        for name, level, found in results.by_level()
+        if name in few and found is not None
+    ]
+
+
+def front_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of the Pareto front; no rows where the study has none."""
+    study = results.study
+    if not study.pareto:
+        return (), []
+    names = [factor.name for factor in study.design.factors if len(factor.levels) != 1]
+    columns = [results.numbers(name) for name in study.pareto]
+    rows = []
+    for i in results.front(study.pareto):
+        values = dict(zip((factor.name for factor in study.design.factors), study.design.values(int(i)), strict=True))
+        rows.append((*(_number(column[i]) for column in columns), *(_value(values[name]) for name in names)))
+    return (*study.pareto, *names), rows
+
+
+def notes(results: Results) -> tuple[str, ...]:
+    """Return what was varied on what basis, and why samples were refused or have no motion."""
+    factors = results.study.design.factors
+    said = [f"{f.name}: {f.law}; {f.basis}: {f.source}" for f in factors]
+    for status, word in ((REFUSED, "refused"), (INFEASIBLE, "without a motion")):
+        said += [f"{count} {word}: {reason}" for reason, count in results.reasons(status)[:_FEW]]
+    said += [f"tightest limit in {count:,} samples: {name}" for name, count in results.tightest()[:_FEW]]
+    return tuple(said)
+
+
+def to_markdown(results: Results) -> str:
+    """Return the report of a study."""
+    asked, how, answer = sentences(results)
+    found = summaries(results)
+    lines = [f"# {asked}", "", how, "", answer, "", "## Responses", "", *table(RESPONSE_HEADER, response_rows(found))]
+    lines += ["", "*First order* is the standard deviation by first-order propagation of the factors' deviations."]
+    for name, indices in _indexed(results, found):
+        lines += ["", f"## What decides {name}", "", *table(INDEX_HEADER, index_rows(results, indices))]
+    levels = level_rows(results)
+    if levels:
+        lines += ["", "## By level", "", *table(LEVEL_HEADER, levels)]
+    header, rows = front_rows(results)
+    if rows:
+        lines += ["", f"## Pareto front of least {', '.join(results.study.pareto)}", "", *table(header, rows)]
+    lines += section("Factors and notes", notes(results))
+    return "\n".join(lines) + "\n"
+
+
+def to_json(results: Results, files: dict[str, str]) -> dict[str, Any]:
+    """Return the JSON object of `boom study`, in SI."""
+    study, found = results.study, results.fails()
+    responses = [asdict(each) | {"indices": [asdict(index) for index in each.indices]} for each in summaries(results)]
+    header, rows = front_rows(results)
+    return {
+        "study": study.name,
+        "question": study.question,
+        "work": study.work,
+        "design": str(study.design.kind),
+        "seed": study.seed,
+        "samples": len(results.refused),
+        "infeasible": int(results.infeasible.sum()),
+        "refused": int(results.refused.sum()),
+        "probability_of_FAIL": None if found is None else asdict(found) | {"estimate": found.estimate},
+        "what_decides_FAIL": [asdict(index) for index in results.indices(FAILS)],
+        "by_level": [
+            {"factor": name, "level": level, **asdict(each), "estimate": each.estimate}
+            for name, level, each in results.by_level()
+            if each is not None
+        ],
+        "responses": responses,
+        "pareto": [dict(zip(header, row, strict=True)) for row in rows],
+        "factors": [
+            {"name": f.name, "keys": list(f.keys), "law": f.law, "basis": f.basis, "source": f.source}
+            for f in study.design.factors
+        ],
+        "files": files,
+    }
+
+
+def _indexed(results: Results, found: Sequence[ResponseSummary]) -> list[tuple[str, tuple[Index, ...]]]:
+    """Return the responses with indices, FAIL first."""
+    named = [(FAILS, results.indices(FAILS)), *((each.name, each.indices) for each in found)]
+    return [(name, indices) for name, indices in named if indices]
+
+
+def _number(value: float) -> str:
+    return f"{float(f'{value:.4g}'):.12g}"
+
+
+def _value(value: Value) -> str:
+    return _number(value) if isinstance(value, float) else str(value)

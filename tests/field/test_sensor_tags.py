@@ -1,0 +1,163 @@
+"""The sensor at the end of the boom: a whole field day known exactly, its sag, its covariance against samples."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from boom_model import Boom, InputError, inverse_dynamics, jacobian, tip_deflection
+from planner.field import attitude
+from planner.field.arm import lever_arm, play, yielding
+from planner.field.log_files import JointLog, read_joint_log, read_triggers, read_vehicle_log
+from planner.field.rig import read_rig
+from planner.field.sensor_tags import joints_at, tag_sensor
+from tests.builders import without_drives
+from tests.field.field_files import FRAME, joint_position, true_spots, write_field
+from tests.field.motions import Drive
+
+
+@pytest.fixture(scope="module")
+def day(tmp_path_factory):
+    names = write_field(tmp_path_factory.mktemp("day"), Drive())
+    logs = read_vehicle_log(names["vehicle"]), read_joint_log(names["joints"]), read_triggers(names["triggers"])
+    return read_rig(names["rig"]), *logs
+
+
+def test_sensor_and_spot_of_a_rigid_arm(day):
+    """Without drives nothing winds up: sensor and spot are where the marched rays say."""
+    boom, drive = without_drives(Boom.load()), Drive()
+    found = tag_sensor(boom, *day)
+    assert found.known.all()
+    stamps = found.triggers.t - 1.7830e9
+    sensor, spot = true_spots(boom, drive, stamps, joint_position(stamps - 0.02))
+    assert np.linalg.norm(FRAME.enu(found.sensor.ecef) - sensor, axis=-1).max() < 4e-4
+    assert np.linalg.norm(FRAME.enu(found.seen.ecef) - spot, axis=-1).max() < 5e-4
+    middle = FRAME.enu(found.footprint).mean(axis=1)
+    assert np.linalg.norm(middle - spot, axis=-1).max() < 0.15  # perspective moves the middle of an oblique footprint
+    assert found.bearing[0] == pytest.approx(np.arctan2(*found.view[0, :2]) % (2.0 * np.pi))
+
+
+def test_footprint_straight_down(day):
+    """A footprint of 0.4 by 0.6 m at 1 m, at the range of the canopy."""
+    boom = without_drives(Boom.load())
+    rig, log, joints, triggers = day
+    q = joints.q.copy()
+    q[:, 4] = np.pi - q[:, 2]
+    still = replace(log, R_ecef_body=np.tile(FRAME.R_ecef_enu @ rig.R_body_imu, (len(log.t), 1, 1)))
+    found = tag_sensor(boom, rig, still, replace(joints, q=q), triggers)
+    corners = FRAME.enu(found.footprint)
+    depth = FRAME.enu(found.sensor.ecef)[:, 2] - corners[:, 0, 2]
+    sides = np.linalg.norm(np.diff(corners, axis=1), axis=-1)
+    assert sides == pytest.approx(np.stack([0.4 * depth, 0.6 * depth, 0.4 * depth], axis=-1), rel=2e-4)
+    assert np.linalg.norm(found.seen.ecef - found.footprint.mean(axis=1), axis=-1).max() < 1e-4
+
+
+def test_sag_is_that_of_the_tip(day):
+    """To first order, what `tip_deflection` says at the joint torques of gravity."""
+    boom, (rig, *_) = Boom.load(), day
+    q = joint_position(np.linspace(0.0, 20.0, 30))
+    up = np.tile([0.0, 0.0, 1.0], (30, 1))
+    bent = yielding(boom, q, up)
+    tau = inverse_dynamics(boom, q, np.zeros(5), np.zeros(5)).tau
+    at_tip = replace(rig, sensor=np.zeros(3))
+    moved = lever_arm(boom, at_tip, bent, np.zeros((30, 5)), np.zeros(3)).r
+    moved = (moved - lever_arm(boom, at_tip, q, np.zeros((30, 5)), np.zeros(3)).r) @ rig.R_body_mount
+    assert np.abs(moved).max() > 1e-3
+    assert moved == pytest.approx(tip_deflection(boom, q, tau).wind_up, abs=2e-5)
+
+
+def test_sag_is_down_and_counts(day):
+    found = tag_sensor(Boom.load(), *day)
+    assert (found.sag[:, 2] < -1e-3).all()
+    rigid = tag_sensor(without_drives(Boom.load()), *day)
+    difference = (found.sensor.ecef - rigid.sensor.ecef) @ FRAME.R_ecef_enu
+    assert difference == pytest.approx(found.sag, abs=1e-6)
+    assert any("wrist has no drive" in note for note in found.notes)
+    assert any("assumed: ground" in note for note in found.notes)
+
+
+def test_lever_arms_covariance_equals_samples(day):
+    """Every part of the rig moved at random, at ten poses; the formula is written out again here."""
+    boom, (rig, *_) = Boom.load(), day
+    random, count = np.random.default_rng(7), 40_000
+    backlash = play(boom)[0]
+    assert backlash[1] > 0.0
+    for t in np.linspace(0.0, 20.0, 10):
+        q = joint_position(np.array([t]))
+        found = lever_arm(boom, rig, q, np.zeros((1, 5)), rig.sensor).covariance[0]
+        joints = q + random.normal(size=(count, 5)) * np.hypot(rig.joint_std, backlash)
+        tip = lever_arm(boom, rig, joints, np.zeros((count, 5)), rig.sensor + random.normal(size=(count, 3)) * rig.sensor_std)
+        arm = tip.r + rig.antenna - rig.mount
+        arm = arm + np.cross(random.normal(size=(count, 3)) * rig.mount_turn_std, arm)
+        shift = random.normal(size=(count, 3)) * rig.mount_std - random.normal(size=(count, 3)) * rig.antenna_std
+        r = rig.mount - rig.antenna + arm + shift
+        r = r + np.cross(random.normal(size=(count, 3)) * rig.imu_std, r)
+        theirs = np.cov(r.T)
+        scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
+        assert (np.abs(found - theirs) / scale).max() < 0.03
+
+
+def test_rate_is_the_jacobians(day):
+    boom, (rig, *_) = Boom.load(), day
+    q, qd = joint_position(np.array([3.0])), np.array([[0.1, -0.2, 0.15, 0.05, 0.3]])
+    half = 1e-6
+    ahead, behind = (lever_arm(boom, rig, q + s * half * qd, qd, rig.sensor).r for s in (1.0, -1.0))
+    assert lever_arm(boom, rig, q, qd, rig.sensor).rate == pytest.approx((ahead - behind) / (2.0 * half), abs=1e-8)
+    plain = replace(rig, R_body_mount=np.eye(3))
+    assert lever_arm(boom, plain, q, qd, np.zeros(3)).rate[0] == pytest.approx(jacobian(boom, q[0])[:3] @ qd[0], abs=1e-12)
+
+
+def test_spots_covariance_equals_samples(day):
+    """Attitude and height of the canopy moved at random under an oblique view."""
+    boom = without_drives(Boom.load())
+    rig, log, joints, triggers = day
+    quiet = replace(rig, antenna_std=0.0, imu_std=0.0, mount_std=0.0, mount_turn_std=0.0, joint_std=np.zeros(5), sensor_std=0.0)
+    n = len(log.t)
+    log = replace(log, position_covariance=np.zeros((n, 3, 3)), attitude_covariance=np.tile(np.eye(3) * 0.002**2, (n, 1, 1)))
+    found = tag_sensor(boom, quiet, log, joints, triggers)
+    k, random, count = 20, np.random.default_rng(8), 50_000
+    R0, view, sensor = found.sensor.R_enu_body[k], found.view[k], FRAME.enu(found.sensor.ecef[k])
+    arm = R0.T @ (sensor - FRAME.enu(_antenna(log, found.triggers.t[k] - 0.02)))
+    depth = (FRAME.enu(found.seen.ecef[k]) - sensor)[2]
+    errors = random.normal(0.0, 0.002, (count, 3)) + attitude.angles(R0)
+    R = attitude.rotation(*errors.T)
+    rays = np.einsum("nij,j->ni", R, R0.T @ view)
+    shifted = np.einsum("nij,j->ni", R, arm) - R0 @ arm
+    heights = depth - shifted[:, 2] + random.normal(0.0, rig.ground_std, count)
+    spots = (shifted + rays * (heights / rays[:, 2])[:, None])[:, :2]
+    theirs = np.cov(spots.T)
+    scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
+    assert (np.abs(found.seen.covariance[k, :2, :2] - theirs) / scale).max() < 0.04
+
+
+def _antenna(log, t):
+    k = int(np.searchsorted(log.t, t)) - 1
+    u = (t - log.t[k]) / (log.t[k + 1] - log.t[k])
+    return (1.0 - u) * log.ecef[k] + u * log.ecef[k + 1]
+
+
+def test_gaps_of_the_joints_and_clocks():
+    t = np.r_[np.arange(0.0, 1.0, 0.01), np.arange(1.5, 2.0, 0.01)]
+    log = JointLog(t, joint_position(t), "own", "joints.csv", np.arange(len(t)) + 2)
+    q, qd, reasons = joints_at(log, np.array([-1.0, 0.505, 1.2, 9.0]))
+    assert [bool(reason) for reason in reasons] == [True, False, True, True]
+    assert "in a gap of 0.51 s before line 102 of joints.csv" in reasons[2]
+    assert q[1] == pytest.approx(joint_position(np.array([0.505]))[0], abs=1e-6)
+    assert qd[1] == pytest.approx((joint_position(np.array([0.506])) - joint_position(np.array([0.504])))[0] / 0.002, abs=1e-4)
+
+
+def test_views_to_the_sky_have_no_spot(day):
+    rig, log, joints, triggers = day
+    found = tag_sensor(Boom.load(), replace(rig, view=np.array([-1.0, 0.0, 0.0])), log, joints, triggers)
+    assert found.known.all()
+    assert np.isnan(found.seen.ecef).all()
+    assert np.isnan(found.footprint).all()
+    assert any("views do not meet the canopy" in note for note in found.notes)
+
+
+def test_triggers_in_local_time_or_another_clock_are_refused(day):
+    rig, log, joints, triggers = day
+    with pytest.raises(InputError, match=r"no trigger has a position: .* local time"):
+        tag_sensor(Boom.load(), rig, log, joints, replace(triggers, t=triggers.t - 6 * 3600.0))
+    with pytest.raises(InputError, match="give all one clock"):
+        tag_sensor(Boom.load(), rig, log, joints, replace(triggers, clock="own"))
