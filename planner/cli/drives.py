@@ -106,7 +106,8 @@ def mission(
     if alone:
         ((name, report),) = reports.items()
         asked = f"mission {name}, {report.duration:.0f} s, payload {boom.payload.mass:g} kg"
-        return print_report(report, asked, written, as_json, whole, f"boom size {missions[0]}")
+        cost = None if report.energy is None else report.energy.sentence
+        return print_report(report, asked, written, as_json, whole, f"boom size {missions[0]}", cost)
     if as_json:
         print_json({"missions": {name: report.to_json({}) for name, report in reports.items()}, "files": written})
     else:

@@ -23,12 +23,14 @@ from boom_model.kinematics.constraints import parse_constraint
 from boom_model.plausible import DURATION, LIFE, TIP_TOLERANCE
 from boom_model.toml_file import Table, read_toml
 from planner.checks.drives.duty import Duty
+from planner.checks.energy import ASSUMED_SUPPLY, Energy, Supply, energy_of
+from planner.checks.evaluation import Evaluation
 from planner.files import named_file
 from planner.motion.trajectory import STEP, Trajectory
 from planner.motion.vehicle import LEVEL, VehicleCase
 from planner.move_spec import MoveWords
 from planner.paths.targets import Target, TipTarget, parse_pitch, parse_target, resolve
-from planner.planning import check, plan_motion
+from planner.planning import check_motion, plan_motion
 from planner.progress import Track
 from planner.reports.report import Report
 from planner.timing.profile import JerkLimited
@@ -89,6 +91,7 @@ class _MissionTable(Table):
     constraint: str = _HORIZONTAL
     required_life_h: Annotated[float, LIFE] | None = None
     tip_tolerance_mm: Annotated[float, TIP_TOLERANCE] | None = None
+    plots: Annotated[int, Field(gt=0)] | None = None
     steps: Annotated[list[_Step], Field(min_length=1)]
 
 
@@ -111,6 +114,11 @@ class Mission:
         """Tolerance of the tip's position [m]."""
         tolerance = self.table.tip_tolerance_mm
         return None if tolerance is None else Sourced(tolerance * 1e-3, self.origin)
+
+    @property
+    def plots(self) -> int | None:
+        """Number of plots that a cycle covers; None if not given."""
+        return self.table.plots
 
     @property
     def jerk_limited(self) -> bool:
@@ -290,11 +298,21 @@ def check_cycle(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", veh
         InputError: the vehicle moves.
     """
     check_steady(vehicle)
-    report = check(
-        boom, cycle.trajectory, payload_as=payload_as, vehicle=vehicle, profile=f"mission {cycle.mission.name}", duty=cycle.duty
-    )
+    name, duty = f"mission {cycle.mission.name}", cycle.duty
+    move = check_motion(boom, cycle.trajectory, payload_as=payload_as, vehicle=vehicle, profile=name, duty=duty)
+    report = move.report
     stated = cycle.mission.assumptions
-    return replace(report, notes=(*leg_sentences(cycle), *report.notes), assumptions=(*stated, *report.assumptions))
+    return replace(
+        report,
+        notes=(*leg_sentences(cycle), *report.notes),
+        assumptions=(*stated, *report.assumptions),
+        energy=cycle_energy(cycle, move.evaluation),
+    )
+
+
+def cycle_energy(cycle: Cycle, evaluation: Evaluation, supply: Supply = ASSUMED_SUPPLY) -> Energy:
+    """Return power and energy of a cycle, from the evaluation of its samples; see `energy_of`."""
+    return energy_of(evaluation, cycle.duty, [samples for _, samples in cycle.slices()], list(cycle.counts), supply)
 
 
 def leg_sentences(cycle: Cycle) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ import rerun.blueprint as rrb
 
 from boom_model import forward_kinematics
 from boom_model.kinematics.reach import ReachMap
+from planner.checks.energy import joint_powers
 from planner.planning import Move
 from planner.recording import drive_plots, joint_plots
 from planner.recording.arrows import arrow_scale, log_arrows
@@ -43,6 +44,8 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
     /plots/ratio              torque / limit of each driven joint
     /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle terms, which
                               add up to tau
+    /plots/power/<joint>      power at the joint; loss in windings and gearbox, and electrical power,
+                              of a drive with data [W]
     /plots/motor/<joint>      motor torque, available torque, and available torque less the stepper
                               margin [Nm]
     /plots/gearbox/<joint>    gearbox torque and its ratings [Nm]
@@ -73,6 +76,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
         "Velocities": joint_plots.velocity_plots(boom, trajectory),
         "Accelerations": joint_plots.acceleration_plots(boom, trajectory),
     }
+    powers = list(joint_plots.power_bundles(joint_powers(move.sampled)))
     parts, forces = list(joint_plots.part_bundles(move.parts)), list(joint_plots.load_bundles(boom.mount, loads))
     drives = {
         "Margins": list(drive_plots.margin_bundles(move)),
@@ -95,6 +99,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
         grid("Torques", torques),
         rrb.Tabs(*(grid(name, tab) for name, tab in joints.items()), active_tab=0, name="Joints"),
         grid("Torque parts", parts),
+        grid("Power", powers),
         *([grid("Pins and mount", forces)] if forces else []),
         *([rrb.Tabs(*drive_tabs, active_tab=0, name="Drives")] if drive_tabs else []),
         text("checks", "Checks"),
@@ -127,7 +132,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
             log_boundary(recording, reach)
         for plot in (*torques, *(plot for tab in joints.values() for plot in tab)):
             plot.log(recording, trajectory.t)
-        for bundle in (*parts, *forces, *(bundle for tab in drives.values() for bundle in tab)):
+        for bundle in (*parts, *powers, *forces, *(bundle for tab in drives.values() for bundle in tab)):
             bundle.log(recording, trajectory.t)
         for plane in motors:
             log_plane(recording, trajectory.t, plane)

@@ -365,7 +365,7 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
     shown = blueprint(recording)
     origins = [row[0] for row in shown["ViewBlueprint:space_origin"]]
     plots = {e for e in recording.entities() if e.startswith("/plots/") and not e.endswith("/limits")}
-    assert len(plots) == 4 * 5 + 1 + 1 + 5 + 2 + 1 + 3 * 2 + 1
+    assert len(plots) == 4 * 5 + 1 + 1 + 5 + 5 + 2 + 1 + 3 * 2 + 1
     others = {"/world", "/legend", "/plane/inner", "/plane/lower", "/drives", "/checks", "/assumptions", "/report"}
     assert sorted(origins) == sorted(plots | others)
     classes = [row[0] for row in shown["ViewBlueprint:class_identifier"]]
@@ -374,10 +374,10 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
     style = "SeriesLines" if which == "recorded" else "SeriesPoints"  # no line goes through one sample
     for plot in plots:
         curves = recording.static(plot, f"{style}:names")
-        assert names[plot] == curves[0] if len(curves) == 1 else re.search(r"\[(N|Nm|mm|%|-)\]$", names[plot])
+        assert names[plot] == curves[0] if len(curves) == 1 else re.search(r"\[(N|Nm|W|mm|%|-)\]$", names[plot])
     tabs = {row[0] for row in shown["ContainerBlueprint:display_name"]}
     joints, drives = {"Positions", "Velocities", "Accelerations"}, {"Torque-speed", "Margins", "Motors", "Gearboxes", "Tip"}
-    assert tabs == {"Torques", "Joints", "Torque parts", "Pins and mount", "Drives"} | joints | drives
+    assert tabs == {"Torques", "Joints", "Torque parts", "Power", "Pins and mount", "Drives"} | joints | drives
     assert shown["TimePanelBlueprint:timeline"] == [["t"]]
 
 
