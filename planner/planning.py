@@ -17,6 +17,7 @@ from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import Constraint
 from planner.checks.certificate import certificate_of
 from planner.checks.drives.duty import Duty
+from planner.checks.energy import energy_of
 from planner.checks.evaluation import Evaluation, at_samples, evaluate
 from planner.checks.motion_checks import check_rows
 from planner.checks.stopping import WorstStop, worst_stop
@@ -328,6 +329,7 @@ def _move(evaluation: Evaluation, trajectory: Trajectory, profile: str, duty: Du
         assumptions=assumptions(evaluation.boom, grid.qddd is not None),
         peaks=_peaks(evaluation),
         certificate=certificate_of(evaluation),
+        energy=energy_of(evaluation) if duty is None else None,
     )
     return Move(profile, trajectory, evaluation, report)
 

@@ -141,18 +141,19 @@ def kinetic_energy(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
     return energy
 
 
-def potential_energy(boom: Boom, q: ArrayLike) -> Array:
-    """Return the potential energy, the sum of m g z over bodies and payload (...) [J].
+def potential_energy(boom: Boom, q: ArrayLike, *, up: ArrayLike = (0.0, 0.0, 1.0)) -> Array:
+    """Return the potential energy, the sum of m g (up . c) over bodies and payload (...) [J].
 
-    The height z is measured from frame 1 on level ground.
+    Heights of the centres of mass c are measured from the origin of frame 1 along `up`, a unit
+    vector (3,) in frame 1; its default is level ground.
 
     Raises:
-        InputError: q is not finite or not (..., 5).
+        InputError: q is not finite or not (..., 5), or `up` is not finite or not (3,).
     """
-    q = checked("q", q, 5)
+    q, up = checked("q", q, 5), checked("up", up, 3)
     zero = np.zeros(5)
     masses = {**boom.bodies, "payload": boom.payload}
-    heights = {name: motion.com[..., 2] for name, motion in body_motion(boom, q, zero, zero).items()}
+    heights = {name: motion.com @ up for name, motion in body_motion(boom, q, zero, zero).items()}
     return boom.gravity * np.asarray(sum(masses[name].mass * z for name, z in heights.items()))
 
 

@@ -167,6 +167,10 @@ class CheckKind(StrEnum):
     MOTOR_TORQUE_OTHER_READING = "motor torque, other reading", Part.MOTOR, Quantity.MOMENT, Severity.INFORMATION
     MOTOR_SPEED = "motor speed", Part.MOTOR, Quantity.SHAFT_SPEED
     MOTOR_RMS_TORQUE = "motor RMS torque", Part.MOTOR, Quantity.MOMENT, Severity.INFORMATION
+    MOTOR_HOLDING_POWER = "motor holding power", Part.MOTOR, Quantity.POWER, Severity.INFORMATION
+    """Loss in the windings at rated current."""
+    MOTOR_PEAK_POWER = "motor peak power", Part.MOTOR, Quantity.POWER, Severity.INFORMATION
+    """At the motor's shaft."""
     MOTOR_INERTIA_RATIO = "motor inertia ratio", Part.MOTOR, Quantity.SHARE, Severity.GUIDELINE
     MOTOR_RESONANCE_DWELL = "motor resonance dwell", Part.MOTOR, Quantity.TIME, Severity.GUIDELINE
     MOTOR_AGAINST_GEARBOX = "motor against gearbox", Part.MOTOR, Quantity.MOMENT, Severity.GUIDELINE

@@ -95,7 +95,8 @@ def mission(
     if len(reports) == 1 and not joints:
         ((name, report),) = reports.items()
         asked = f"mission {name}, {report.duration:.0f} s, payload {boom.payload.mass:g} kg"
-        return print_report(report, asked, written, as_json, whole, f"boom size {missions[0]}")
+        cost = None if report.energy is None else report.energy.sentence
+        return print_report(report, asked, written, as_json, whole, f"boom size {missions[0]}", cost)
     return _print_compared(reports, joints, written, as_json, whole)
 
 

@@ -36,7 +36,13 @@ STYLES = {
 
 
 def print_report(
-    report: "Report", asked: str, written: Mapping[str, str], as_json: bool, whole: bool = False, then: str | None = None
+    report: "Report",
+    asked: str,
+    written: Mapping[str, str],
+    as_json: bool,
+    whole: bool = False,
+    then: str | None = None,
+    cost: str | None = None,
 ) -> int:
     """Print a report, and return the exit code.
 
@@ -47,6 +53,7 @@ def print_report(
         as_json: whether to print JSON instead of text.
         whole: whether to print every row, assumption and note, instead of a summary.
         then: a command to try next.
+        cost: what the motion takes from the supply, in a line.
     """
     from planner.checks.rows import Verdict
 
@@ -54,6 +61,7 @@ def print_report(
         print_json(report.to_json(dict(written)))
     else:
         _print_answer(report, asked, whole)
+        print_lines(None, [] if cost is None or whole else [cost])
         if whole:
             _print_details(report)
         print_files(written)
@@ -89,6 +97,7 @@ def _print_answer(report: "Report", asked: str, whole: bool) -> None:
 
 
 def _print_details(report: "Report") -> None:
+    from planner.checks.energy import ENERGY_HEADER, energy_cells
     from planner.reports.report import CERTIFICATE_HEADER, PEAK_HEADER, ROW_HEADER, cells, peak_cells, worst_cells
 
     rows = report.rows
@@ -102,6 +111,10 @@ def _print_details(report: "Report") -> None:
     )
     click.echo("Largest torques and where they come from (Nm, the extension's N)")
     print_rows(PEAK_HEADER, map(peak_cells, report.peaks), drop=("at", "vehicle", "friction", "velocity"))
+    if report.energy is not None:
+        click.echo("Energy")
+        print_rows(ENERGY_HEADER, map(energy_cells, report.energy.joints), drop=("friction", "largest"))
+        print_lines(None, report.energy.sentences)
     if report.certificate is not None:
         click.echo("Worst ratio to each limit")
         print_rows(CERTIFICATE_HEADER, map(worst_cells, report.certificate.worst))

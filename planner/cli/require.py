@@ -4,8 +4,8 @@ from typing import Any
 
 import click
 
-from boom_model.plausible import FREQUENCY, TIP_TOLERANCE
-from planner.cli.completion import OutFile, joints, missions
+from boom_model.plausible import EFFICIENCY, FREQUENCY, TIP_TOLERANCE
+from planner.cli.completion import OneOf, OutFile, joints, missions
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -35,6 +35,25 @@ from planner.cli.printing import print_files, print_json, print_lines, print_row
               help="First frequency that the stiffnesses must give.")  # fmt: skip
 @click.option("--tip-error", type=float, callback=plausible(TIP_TOLERANCE), metavar="MM",
               help="Error of the tip through backlash; otherwise the mission's tip_tolerance_mm.")  # fmt: skip
+@click.option(
+    "--current",
+    type=OneOf(["full", "reduced", "brake", "load"]),
+    metavar="full|reduced|brake|load",
+    default="brake",
+    show_default=True,
+    help="Phase current: rated always, reduced at standstill, off under a brake too, or as the load asks.",
+)
+@click.option(
+    "--surplus",
+    type=OneOf(["resistor", "battery"]),
+    metavar="resistor|battery",
+    default="resistor",
+    show_default=True,
+    help="Where power goes that the drives give back.",
+)
+@click.option("--driver-efficiency", type=float, default=90.0, show_default=True, callback=plausible(EFFICIENCY), metavar="%",
+              help="Efficiency of the motor drivers.")  # fmt: skip
+@click.option("--cycles", type=click.IntRange(1), default=1, show_default=True, help="Times that the mission runs a day.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Torque over speed of every joint, with its hull.")
 @payload_option
 @payload_as_option
@@ -48,6 +67,10 @@ def require(
     joints: tuple[str, ...],
     frequency: float,
     tip_error: float | None,
+    current: str,
+    surplus: str,
+    driver_efficiency: float,
+    cycles: int,
     picture: str | None,
     payload: float | None,
     payload_as: Any,
@@ -57,7 +80,7 @@ def require(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """List what the drive of each joint must give on a mission: a sheet for a supplier.
+    """List what the drive of each joint must give on a mission, and what the fitted ones take.
 
     MISSION is a FILE.toml, or one of field-day, table-2-4 and table-3-1.
 
@@ -65,10 +88,14 @@ def require(
     Examples:
       boom require field-day --report sheet.pdf
       boom require field-day --joint yaw --tip-error 5 --picture yaw.png
+      boom require field-day --current load --surplus battery --cycles 3
     """
     from boom_model import JOINTS
-    from planner.missions.mission import load_mission, plan_cycle
+    from planner.checks.energy import Current, Supply, Surplus
+    from planner.checks.evaluation import at_samples
+    from planner.missions.mission import cycle_energy, load_mission, plan_cycle
     from planner.reports.report import assumptions
+    from planner.sizing.day import Day
     from planner.sizing.requirement import requirements
     from planner.sizing.requirement_tables import requirement_markdown, requirement_notes
 
@@ -85,15 +112,18 @@ def require(
         payload_as=payload_as,
         vehicle=case,
     )
+    supply = Supply(Current(current), efficiency=driver_efficiency / 100.0, surplus=Surplus(surplus))
+    evaluation = at_samples(boom, cycle.trajectory, vehicle=case, payload_as=payload_as, reactions=False)
+    day = Day(cycle_energy(cycle, evaluation, supply), cycles, asked.plots)
     title = f"mission {asked.name}, payload {boom.payload.mass:g} kg"
     notes, assumed = requirement_notes(needs), (*asked.assumptions, *assumptions(boom, asked.jerk_limited))
-    text = requirement_markdown(f"Required of the drives: {title}", needs, notes, assumed)
+    text = requirement_markdown(f"Required of the drives: {title}", needs, day, notes, assumed)
     written = _write(files, needs, text, picture, document)
     if as_json:
-        _print_json(asked.name, needs, notes, assumed, written)
+        _print_json(asked.name, needs, day, notes, assumed, written)
     else:
         print_lines(None, [f"{title}: required at the joint of each drive"])
-        _print_sheet(needs, notes, assumed, whole)
+        _print_sheet(needs, day, notes, assumed, whole)
         print_files(written)
         print_lines("next", [] if whole or document else [f"boom require {mission} --report sheet.pdf"])
     return 0
@@ -117,10 +147,12 @@ def _write(files: Any, needs: Any, text: str, picture: str | None, document: str
     return written
 
 
-def _print_sheet(needs: Any, notes: Any, assumed: Any, whole: bool) -> None:
+def _print_sheet(needs: Any, day: Any, notes: Any, assumed: Any, whole: bool) -> None:
+    from planner.checks.energy import ENERGY_HEADER, energy_cells
     from planner.sizing.requirement_tables import SHEET, STEP_HEADER, items, sheet_rows, step_rows
 
     print_rows(SHEET, sheet_rows(needs), drop=("starts", "drive", "inertia"))
+    print_lines(None, [day.energy.sentence, *day.sentences])
     if not whole:
         count = f"{len(notes)} notes, {len(assumed)} assumed figures"
         print_lines(None, [f"torque-speed table, stiffness, reflected inertia, life, {count}: --all lists them"])
@@ -129,12 +161,14 @@ def _print_sheet(needs: Any, notes: Any, assumed: Any, whole: bool) -> None:
         print_lines(None, [need.joint])
         print_rows(("required", "value"), items(need))
         print_rows(STEP_HEADER, step_rows(need))
+    print_rows(ENERGY_HEADER, map(energy_cells, day.energy.joints), drop=("friction", "largest"))
+    print_lines(None, day.energy.sentences[1:])
     print_lines("note", notes)
     print_lines("assumed", assumed)
 
 
-def _print_json(name: str, needs: Any, notes: Any, assumed: Any, written: dict[str, str]) -> None:
+def _print_json(name: str, needs: Any, day: Any, notes: Any, assumed: Any, written: dict[str, str]) -> None:
     from planner.sizing.requirement_tables import requirement_json
 
-    sheets = [requirement_json(need) for need in needs]
-    print_json({"mission": name, "joints": sheets, "notes": list(notes), "assumptions": list(assumed), "files": written})
+    sheets, said = [requirement_json(need) for need in needs], {"notes": list(notes), "assumptions": list(assumed)}
+    print_json({"mission": name, "joints": sheets, "energy": day.to_json(), **said, "files": written})

@@ -24,6 +24,8 @@ from boom_model.plausible import DURATION, LIFE, TIP_TOLERANCE
 from boom_model.provenance import BasisName
 from boom_model.toml_file import Table, parse_toml, validated
 from planner.checks.drives.duty import Duty
+from planner.checks.energy import ASSUMED_SUPPLY, Energy, Supply, energy_of
+from planner.checks.evaluation import Evaluation
 from planner.files import named_file
 from planner.motion.trajectory import STEP, Trajectory
 from planner.motion.vehicle import LEVEL, VehicleCase
@@ -90,6 +92,7 @@ class _MissionTable(Table):
     constraint: str = _HORIZONTAL
     required_life_h: Annotated[float, LIFE] | None = None
     tip_tolerance_mm: Annotated[float, TIP_TOLERANCE] | None = None
+    plots: Annotated[int, Field(gt=0)] | None = None
     steps: Annotated[list[_Step], Field(min_length=1)]
 
 
@@ -112,6 +115,11 @@ class Mission:
         """Tolerance of the tip's position [m]."""
         tolerance = self.table.tip_tolerance_mm
         return None if tolerance is None else Sourced(tolerance * 1e-3, self.origin)
+
+    @property
+    def plots(self) -> int | None:
+        """Number of plots that a cycle covers; None if not given."""
+        return self.table.plots
 
     @property
     def jerk_limited(self) -> bool:
@@ -321,12 +329,20 @@ def cycle_move(boom: Boom, cycle: Cycle, *, payload_as: PayloadAs = "mass", vehi
         InputError: the vehicle moves.
     """
     check_steady(vehicle)
-    name = f"mission {cycle.mission.name}"
-    move = check_motion(boom, cycle.trajectory, payload_as=payload_as, vehicle=vehicle, profile=name, duty=cycle.duty)
-    notes = (*leg_sentences(cycle), *move.report.notes)
-    return replace(
-        move, report=replace(move.report, notes=notes, assumptions=(*cycle.mission.assumptions, *move.report.assumptions))
+    name, duty = f"mission {cycle.mission.name}", cycle.duty
+    move = check_motion(boom, cycle.trajectory, payload_as=payload_as, vehicle=vehicle, profile=name, duty=duty)
+    report = replace(
+        move.report,
+        notes=(*leg_sentences(cycle), *move.report.notes),
+        assumptions=(*cycle.mission.assumptions, *move.report.assumptions),
+        energy=cycle_energy(cycle, move.evaluation),
     )
+    return replace(move, report=report)
+
+
+def cycle_energy(cycle: Cycle, evaluation: Evaluation, supply: Supply = ASSUMED_SUPPLY) -> Energy:
+    """Return power and energy of a cycle, from the evaluation of its samples; see `energy_of`."""
+    return energy_of(evaluation, cycle.duty, [samples for _, samples in cycle.slices()], list(cycle.counts), supply)
 
 
 def leg_sentences(cycle: Cycle) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Joint positions, rates and torques with limits; torque parts; pin forces and mount loads."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from boom_model import JOINTS, Basis, Boom, Breakdown, Loads
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, LOAD_UNITS, Mount
 from boom_model.drives.drive import drive_inertia, drive_torque_limit
+from planner.checks.energy import JointPower
 from planner.motion.trajectory import Trajectory
 from planner.recording.palette import (
     COLORS,
@@ -114,6 +115,20 @@ def part_bundles(parts: Breakdown) -> Iterator[Bundle]:
         unit = LOAD_UNITS[i]
         values = np.stack([part[:, i] for part in (*each, total)], axis=-1)
         yield Bundle(f"plots/parts/{joint}", f"{joint} [{unit}]", names, [*PART_COLORS.values(), TOTAL_COLOR], values)
+
+
+def power_bundles(powers: Sequence[JointPower]) -> Iterator[Bundle]:
+    """Yield the power of each joint: at the joint, and of a known drive what it loses and what it takes."""
+    for power in powers:
+        known = {
+            "at the joint": (power.output, JOINT_COLORS[power.joint]),
+            "windings": (power.copper, ORANGE),
+            "gear loss": (power.gear_loss, PURPLE),
+            "electrical": (power.electrical, SKY_BLUE),
+        }
+        series = {name: (values, color) for name, (values, color) in known.items() if values is not None}
+        colors, values = [color for _, color in series.values()], [values for values, _ in series.values()]
+        yield Bundle(f"plots/power/{power.joint}", f"{power.joint} power [W]", [*series], colors, np.stack(values, axis=-1))
 
 
 def load_bundles(mount: Mount, loads: Loads) -> Iterator[Bundle]:

@@ -8,6 +8,7 @@ import rerun.blueprint as rrb
 
 from boom_model import JOINTS, forward_kinematics
 from boom_model.kinematics.reach import ReachMap
+from planner.checks.energy import joint_powers
 from planner.planning import Move
 from planner.recording import drive_plots, joint_plots
 from planner.recording.arrows import arrow_scale, log_arrows
@@ -47,6 +48,8 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
     /plots/ratio              torque / limit of each driven joint
     /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle terms, which
                               add up to tau
+    /plots/power/<joint>      power at the joint; loss in windings and gearbox, and electrical power,
+                              of a drive with data [W]
     /plots/motor/<joint>      motor torque, available torque, and available torque less the stepper
                               margin [Nm]
     /plots/gearbox/<joint>    gearbox torque, its ratings and the average of the cycle [Nm]
@@ -82,6 +85,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
         "Velocities": joint_plots.velocity_plots(boom, trajectory),
         "Accelerations": joint_plots.acceleration_plots(boom, trajectory),
     }
+    powers = list(joint_plots.power_bundles(joint_powers(move.sampled)))
     parts, forces = list(joint_plots.part_bundles(move.parts)), list(joint_plots.load_bundles(boom.mount, loads))
     drives = {
         "Margins": list(drive_plots.margin_bundles(move)),
@@ -101,7 +105,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
     bars = {joint: rows for joint in JOINTS if (rows := margin_rows(move, joint))}
     if bars:
         drive_tabs.append(rrb.Vertical(*(margins_view(joint) for joint in bars), name="All margins"))
-    moving: dict[str, Sequence[Plot | Bundle]] = {**joints, "Torque parts": parts, "Pins and mount": forces}
+    moving: dict[str, Sequence[Plot | Bundle]] = {**joints, "Torque parts": parts, "Power": powers, "Pins and mount": forces}
     tabs: list[rrb.View | rrb.Container] = [
         rrb.Vertical(text("answer", "Answer"), states_view(), events_view(), row_shares=[5, 2, 2], name="Answer"),
         grid("Torques", torques),
@@ -142,7 +146,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
             log_boundary(recording, reach)
         for plot in (*torques, *(plot for tab in joints.values() for plot in tab)):
             plot.log(recording, trajectory.t)
-        for bundle in (*parts, *forces, *(bundle for tab in drives.values() for bundle in tab)):
+        for bundle in (*parts, *powers, *forces, *(bundle for tab in drives.values() for bundle in tab)):
             bundle.log(recording, trajectory.t)
         for plane in motors:
             log_plane(recording, trajectory.t, plane)

@@ -9,6 +9,7 @@ from boom_model import JOINTS, Basis, Boom, Breakdown
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, LOAD_UNITS
 from planner.checks.certificate import Certificate
+from planner.checks.energy import ENERGY_HEADER, Energy, energy_cells
 from planner.checks.kinds import Margin
 from planner.checks.rows import Row, Verdict, overall
 from planner.checks.stopping import WorstStop
@@ -71,6 +72,8 @@ class Report:
     """Recomputed worst ratio to each limit of a planned motion; None for a recorded one."""
     stop: WorstStop | None = None
     """Longest and farthest stop on the way of a planned motion; None if not computed."""
+    energy: Energy | None = None
+    """Power and energy; None if not computed."""
     suggestions: tuple[str, ...] = ()
     """Single changes that make a failing motion possible; empty if none were searched."""
 
@@ -126,6 +129,7 @@ class Report:
             "torque_peaks": [asdict(peak) for peak in self.peaks],
             "certificate": None if self.certificate is None else asdict(self.certificate),
             "stop": None if self.stop is None else asdict(self.stop),
+            "energy": None if self.energy is None else self.energy.to_json(),
             "remedies": list(self.suggestions),
             "files": files,
         }
@@ -152,6 +156,9 @@ class Report:
         lines = []
         if self.peaks:
             lines += ["", "## Largest torques and where they come from", "", *table(PEAK_HEADER, map(peak_cells, self.peaks))]
+        if self.energy is not None:
+            lines += ["", "## Power and energy", "", *table(ENERGY_HEADER, map(energy_cells, self.energy.joints))]
+            lines += [f"\n{sentence}" for sentence in self.energy.sentences]
         if self.certificate is not None:
             lines += ["", "## Certificate", "", *table(CERTIFICATE_HEADER, map(worst_cells, self.certificate.worst))]
         lines += [f"\n{sentence}" for sentence in self.sentences]

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from planner.checks.energy import ENERGY_HEADER, energy_cells
 from planner.reports.markdown import section, table
+from planner.sizing.day import Day
 from planner.sizing.requirement import Point, Requirement
 
 SHEET = ("joint", "largest", "cube mean", "hold", "top speed", "power", "inertia", "starts", "drive")
@@ -88,9 +90,13 @@ def step_rows(need: Requirement) -> list[tuple[str, ...]]:
     return [(_speed(need, step.speed), _load(need, step.torque), f"{step.acceleration:.3g} {unit}") for step in need.steps]
 
 
-def requirement_markdown(title: str, needs: Sequence[Requirement], notes: Sequence[str], assumed: Sequence[str]) -> str:
-    """Return the sheets as Markdown: what one sends to a supplier."""
+def requirement_markdown(
+    title: str, needs: Sequence[Requirement], day: Day, notes: Sequence[str], assumed: Sequence[str]
+) -> str:
+    """Return the sheets as Markdown: what one sends to a supplier; power and energy of the fitted drives first."""
     lines = [f"# {title}", "", *table(SHEET, sheet_rows(needs))]
+    lines += ["", "## Power and energy", "", *table(ENERGY_HEADER, map(energy_cells, day.energy.joints))]
+    lines += [f"\n{sentence}" for sentence in (*day.energy.sentences, *day.sentences)]
     for need in needs:
         lines += ["", f"## {need.joint}", "", *table(("required", "value"), items(need))]
         lines += ["", *table(STEP_HEADER, step_rows(need)), "", _DATA_LINEAR if need.is_length else _DATA_TURNING]

@@ -331,7 +331,7 @@ def test_assumptions_are_a_page(panel: Read, move: Move):
 def test_every_view_says_its_unit(panel: Read):
     texts = {"/answer", "/states", "/events", "/checks", "/assumptions", "/report"}
     for origin, title in panel.titles().items():
-        assert origin in texts or re.search(r"\[(m|m/s|m/s\^2|deg|deg/s|deg/s\^2|N|Nm|mm|%|-)\]", title), (origin, title)
+        assert origin in texts or re.search(r"\[(m|m/s|m/s\^2|deg|deg/s|deg/s\^2|N|Nm|W|mm|%|-)\]", title), (origin, title)
 
 
 # Several moves

@@ -364,7 +364,7 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
     shown = blueprint(recording)
     origins = [row[0] for row in shown["ViewBlueprint:space_origin"]]
     plots = {e for e in recording.entities() if e.startswith("/plots/") and not e.endswith("/limits")}
-    assert len(plots) == 4 * 5 + 1 + 1 + 5 + 2 + 1 + 3 * 2 + 1
+    assert len(plots) == 4 * 5 + 1 + 1 + 5 + 5 + 2 + 1 + 3 * 2 + 1
     others = {
         "/world",
         "/legend",
@@ -387,14 +387,14 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
         assert (
             names[plot].removesuffix(", no drive limits it") == curves[0]
             if len(curves) == 1
-            else re.search(r"\[(N|Nm|mm|%|-)\]$", names[plot])
+            else re.search(r"\[(N|Nm|W|mm|%|-)\]$", names[plot])
         )
     tabs = {row[0] for row in shown["ContainerBlueprint:display_name"]}
     joints, drives = (
         {"Positions", "Velocities", "Accelerations"},
         {"Torque-speed", "Margins", "Motors", "Gearboxes", "Tip", "All margins"},
     )
-    assert tabs == FIVE | {"Torque parts", "Pins and mount"} | joints | drives
+    assert tabs == FIVE | {"Torque parts", "Power", "Pins and mount"} | joints | drives
     assert shown["TimePanelBlueprint:timeline"] == [["t"]]
 
 

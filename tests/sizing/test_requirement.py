@@ -29,11 +29,12 @@ from planner.checks.motion_checks import joint_views
 from planner.missions.mission import load_mission, plan_cycle
 from planner.motion.vehicle import load_case
 from planner.sizing.choice import candidates, size
+from planner.sizing.day import Day
 from planner.sizing.offer import shortfalls
 from planner.sizing.requirement import STEPS, requirements
 from planner.sizing.requirement_pictures import requirement_pictures
 from planner.sizing.requirement_tables import requirement_json, requirement_markdown, requirement_notes
-from tests.builders import ORIGIN, SCREW
+from tests.builders import ORIGIN, SCREW, main_move
 
 BOOM = Boom.load()
 _VISCOUS, _COULOMB = np.array([8.0, 20.0, 15.0, 40.0, 1.0]), np.array([2.0, 9.0, 7.0, 20.0, 0.4])
@@ -73,6 +74,10 @@ start = "q=0,90,180,0.5,0"
 [[steps]]
 to = "q=30,90,180,0.5,0"
 """
+
+
+def day():
+    return Day(main_move().report.energy, 2, 10)
 
 
 @pytest.fixture(scope="module")
@@ -253,7 +258,7 @@ def test_a_joint_at_rest_has_a_sheet(tmp_path):
     assert requirement_json(lower)["largest_reflected_inertia_kg_m2"] is None
     assert yaw.starts == 1
     assert not shortfalls(extension, LinearDrive(replace(SCREW, static_force=extension.hold.torque)))
-    text = requirement_markdown("sheet", (lower, extension), requirement_notes((lower, extension)), ())
+    text = requirement_markdown("sheet", (lower, extension), day(), requirement_notes((lower, extension)), ())
     assert "at most any" not in text
 
 
@@ -270,7 +275,7 @@ def test_bad_requests_are_refused(lived):
 
 def test_text_json_and_picture_hold_the_same_figures(needs):
     sheets = list(needs.values())
-    text = requirement_markdown("sheet", sheets, requirement_notes(sheets), ())
+    text = requirement_markdown("sheet", sheets, day(), requirement_notes(sheets), ())
     for need in sheets:
         found = requirement_json(need)
         assert found["joint"] == need.joint

@@ -7,6 +7,7 @@ import numpy as np
 from boom_model import Basis, Drive, Motor, Origin, mesh_efficiency
 from boom_model.arrays import Array
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque, speed_for_torque
+from boom_model.drives.power import copper_power, shaft_power
 from planner.checks.drives.joint_view import JointView
 from planner.checks.kinds import CheckKind
 from planner.checks.rows import SAMPLING_SLACK, Row, Verdict
@@ -30,14 +31,15 @@ RESONANCE_CYCLES = 10.0
 def motor_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     """Return every motor row of a joint.
 
-    Rows of static torque, torque forwards, reversed and at standstill, speed, RMS torque, inertia
-    ratio, resonance, and the motor's torque against the gearbox.
+    Rows of static torque, torque forwards, reversed and at standstill, speed, RMS torque, power,
+    inertia ratio, resonance, and the motor's torque against the gearbox.
     """
     motor, gear = drive.motor, drive.gearbox
     hold, at = view.peak(view.static)
     origin = Origin(Basis.PRINTED, f"{_sheet(motor)}; without help from friction [own derivation]")
     yield view.compared(CheckKind.MOTOR_HOLD, demand=hold / gear.ratio, limit=motor.holding_torque, at=at, origin=origin)
     yield from _torque_rows(view, drive)
+    yield from _power_rows(view, drive)
     yield _inertia_row(view, drive)
     yield _resonance_row(view, drive)
     yield _overload_row(view, drive)
@@ -173,6 +175,25 @@ def _motor_speed_row(view: JointView, drive: Drive, torque: Array) -> Row:
         limit = float(highest[at]) if np.isfinite(highest[at]) else None
     demand, when = float(speed[at]), float(view.t[at])
     return view.compared(CheckKind.MOTOR_SPEED, demand=demand, limit=limit, at=when, origin=origin, warn_near=True)
+
+
+def _power_rows(view: JointView, drive: Drive) -> Iterator[Row]:
+    """Return the rows of the loss in the windings at rated current, and of the largest power at the shaft."""
+    sheet, winding = _sheet(drive.motor), drive.winding
+    loss = Origin(Basis.PRINTED, f"{sheet}; 2 I^2 R at rated current, cold winding")
+    if drive.wiring is None or winding is None:
+        loss = Origin(Basis.PRINTED, f"{sheet}; the loss in the windings needs the wiring")
+    elif drive.wiring.origin.basis is not Basis.PRINTED:
+        loss = Origin(drive.wiring.origin.basis, f"{loss.source}, {drive.wiring.value} ({drive.wiring.origin.basis})")
+    held = None if winding is None else float(copper_power(winding))
+    yield view.informative(CheckKind.MOTOR_HOLDING_POWER, figure=held, origin=loss)
+    flow = shaft_power(drive, view.tau, view.qd, view.qdd)
+    if flow is None:
+        unknown = Origin(Basis.PRINTED, _unknown_torque(drive))
+        yield view.informative(CheckKind.MOTOR_PEAK_POWER, figure=None, origin=unknown)
+        return
+    peak, at = view.peak(flow.shaft)
+    yield view.informative(CheckKind.MOTOR_PEAK_POWER, figure=peak, at=at, origin=Origin(Basis.PRINTED, f"{sheet}; T N qd"))
 
 
 def _inertia_row(view: JointView, drive: Drive) -> Row:
