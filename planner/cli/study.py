@@ -125,4 +125,6 @@ def _details(results: "Results") -> list[tuple[tuple[str, ...], list[Any], int]]
     header, front = report.front_rows(results)
     levels = report.level_rows(results)
     indices = report.index_rows(results, results.indices(FAILS))
-    return [(report.LEVEL_HEADER, levels, 6), (report.INDEX_HEADER, indices, 4), (header, front, 6)]
+    bounds = report.boundary_rows(results)
+    first = [(*bounds, 12)] if bounds[1] else [(report.LEVEL_HEADER, levels, 6)] if not front else []
+    return [*first, (report.INDEX_HEADER, indices, 3), (header, front, 8)]

@@ -103,6 +103,18 @@ class ResponseSummary:
     """The factor that decides first."""
 
 
+@dataclass(frozen=True)
+class Boundary:
+    """How far a factor can go."""
+
+    others: tuple[str, ...]
+    """Levels of the other factors."""
+    largest: float | None
+    """Largest level up to which no sample FAILs; None if the smallest does."""
+    then: str | None
+    """What ends the way: the tightest limit of the next level, or why it has no motion."""
+
+
 class Results:
     """A dataset with its study."""
 
@@ -177,9 +189,48 @@ class Results:
         """Return the probability of FAIL for each level of each factor that has levels."""
         found = []
         for i, factor in enumerate(self.study.design.factors):
-            for k, level in enumerate(factor.levels):
-                shown = f"{level:g}" if isinstance(level, float) else str(level)
-                found.append((factor.name, shown, self.fails(self.study.design.coordinates[:, i] == k)))
+            for k in range(len(factor.levels)):
+                found.append((factor.name, factor.shown(k), self.fails(self.study.design.coordinates[:, i] == k)))
+        return tuple(found)
+
+    def by_combination(self) -> tuple[tuple[tuple[str, ...], Probability], ...]:
+        """Return the probability of FAIL for each combination of levels; () where one factor at most has levels."""
+        leveled = [i for i, factor in enumerate(self.study.design.factors) if len(factor.levels) > 1]
+        if len(leveled) < 2:
+            return ()
+        coordinates = self.study.design.coordinates[:, leveled]
+        found = []
+        for combination in np.unique(coordinates, axis=0):
+            each = self.fails((coordinates == combination).all(axis=1))
+            shown = (self.study.design.factors[i].shown(x) for i, x in zip(leveled, combination, strict=True))
+            if each is not None:
+                found.append((tuple(shown), each))
+        return tuple(found)
+
+    def boundary(self) -> tuple[Boundary, ...]:
+        """Return how far the study's bounded factor can go before a sample FAILs, for each combination of the others.
+
+        Levels are taken in ascending order. A refused sample ends the way too. () without such a factor.
+        """
+        study = self.study
+        if study.boundary is None:
+            return ()
+        names = [factor.name for factor in study.design.factors]
+        b = names.index(study.boundary)
+        others = [i for i in range(len(names)) if i != b]
+        factor, coordinates = study.design.factors[b], study.design.coordinates
+        fails, tightest, reason = self.numbers(FAILS), self.column("tightest"), self.column("reason")
+        sizes = np.array([float(level) for level in factor.levels])
+        found = []
+        for combination in np.unique(coordinates[:, others], axis=0):
+            mine = np.flatnonzero((coordinates[:, others] == combination).all(axis=1))
+            mine = mine[np.argsort(sizes[coordinates[mine, b].astype(int)], kind="stable")]
+            bad = np.flatnonzero(fails[mine] != 0.0)
+            good = mine if not len(bad) else mine[: bad[0]]
+            then = None if not len(bad) else str(tightest[mine[bad[0]]] or reason[mine[bad[0]]])
+            largest = float(sizes[int(coordinates[good[-1], b])]) if len(good) else None
+            shown = tuple(study.design.factors[i].shown(x) for i, x in zip(others, combination, strict=True))
+            found.append(Boundary(shown, largest, then))
         return tuple(found)
 
     def tightest(self) -> tuple[tuple[str, int], ...]:

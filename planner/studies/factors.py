@@ -97,12 +97,17 @@ class Factor:
         """Return the value at a coordinate."""
         return float(coordinate) if self.shape is not None else self.levels[int(coordinate)]
 
+    def shown(self, coordinate: float) -> str:
+        """Return the value at a coordinate as text."""
+        value = self.value(coordinate)
+        return f"{value:.6g}" if isinstance(value, float) else str(value)
+
     @property
     def law(self) -> str:
         """Distribution in words."""
         times = "times " if self.relative else ""
         if self.shape is None:
-            shown = [f"{v:g}" if isinstance(v, float) else str(v) for v in self.levels]
+            shown = [self.shown(i) for i in range(len(self.levels))]
             few = 6
             return times + (", ".join(shown) if len(shown) <= few else f"{shown[0]} to {shown[-1]} in {len(shown)} levels")
         if self.shape == "normal":

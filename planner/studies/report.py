@@ -14,6 +14,7 @@ RESPONSE_HEADER = ("response", "nominal", "5 %", "median", "95 %", "sd", "first 
 INDEX_HEADER = ("factor", "share alone", "+-", "share in all", "+-", "values")
 LEVEL_HEADER = ("factor", "level", "FAIL", "95 % interval", "samples")
 _FEW = 12
+_MOST_COMBINATIONS = 40
 
 
 def sentences(results: Results) -> tuple[str, ...]:
@@ -103,6 +104,29 @@ def level_rows(results: Results) -> list[tuple[str, ...]]:
     ]
 
 
+def combination_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of the probability of FAIL by combination of levels; no rows where there are many."""
+    names = [factor.name for factor in results.study.design.factors if len(factor.levels) > 1]
+    found = results.by_combination()
+    rows = [(*shown, percent(p.estimate), f"{percent(p.low)} to {percent(p.high)}", f"{p.samples:,}") for shown, p in found]
+    return (*names, *LEVEL_HEADER[2:]), rows if len(rows) <= _MOST_COMBINATIONS else []
+
+
+def boundary_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of the largest level without a FAIL; no rows where none is sought."""
+    name = results.study.boundary
+    others = [factor.name for factor in results.study.design.factors if factor.name != name]
+    rows = [
+        (
+            *each.others,
+            "none" if each.largest is None else _number(each.largest),
+            each.then or "nothing up to the largest level",
+        )
+        for each in results.boundary()
+    ]
+    return (*others, f"largest {name}", "then the limit is"), rows
+
+
 def front_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return header and rows of the Pareto front; no rows where the study has none."""
     study = results.study
@@ -138,6 +162,13 @@ def to_markdown(results: Results) -> str:
     levels = level_rows(results)
     if levels:
         lines += ["", "## By level", "", *table(LEVEL_HEADER, levels)]
+    if results.study.design.kind is not DesignKind.GRID:
+        header, rows = combination_rows(results)
+        if rows:
+            lines += ["", "## By combination of levels", "", *table(header, rows)]
+    header, rows = boundary_rows(results)
+    if rows:
+        lines += ["", f"## How large {results.study.boundary} may be", "", *table(header, rows)]
     header, rows = front_rows(results)
     if rows:
         lines += ["", f"## Pareto front of least {', '.join(results.study.pareto)}", "", *table(header, rows)]
@@ -166,6 +197,10 @@ def to_json(results: Results, files: dict[str, str]) -> dict[str, Any]:
             for name, level, each in results.by_level()
             if each is not None
         ],
+        "by_combination": [
+            {"levels": list(levels), **asdict(each), "estimate": each.estimate} for levels, each in results.by_combination()
+        ],
+        "boundary": [asdict(each) for each in results.boundary()],
         "responses": responses,
         "pareto": [dict(zip(header, row, strict=True)) for row in rows],
         "factors": [

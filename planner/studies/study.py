@@ -92,6 +92,7 @@ class _StudyTable(Table):
     step_s: Annotated[float, Field(ge=1e-4, le=1.0)] = STEP
     responses: list[str] = Field(default_factory=lambda: ["used", "duration_s", "tip_error_m"])
     pareto: list[str] = Field(default_factory=list)
+    boundary: str | None = None
     link: dict[str, Any] = Field(default_factory=dict)
     links: dict[str, Any] = Field(default_factory=dict)
     boom: dict[str, Any] = Field(default_factory=dict)
@@ -106,6 +107,8 @@ class _StudyTable(Table):
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"two factors are named {', '.join(twice)}")
+        if self.boundary is not None and (self.boundary not in names or self.design is not DesignKind.GRID):
+            raise ValueError(f"boundary is {self.boundary}; it must be a factor of a grid ({', '.join(names)})")
         return self
 
 
@@ -149,6 +152,9 @@ class Study:
     chunk: int
     responses: tuple[str, ...]
     pareto: tuple[str, ...]
+    """Responses of which the least are sought; () is none."""
+    boundary: str | None
+    """Factor of a grid of which the largest level without a FAIL is sought."""
 
 
 def named_studies() -> tuple[str, ...]:
@@ -203,6 +209,7 @@ def load_study(
         chunk=table.chunk,
         responses=tuple(table.responses),
         pareto=tuple(table.pareto),
+        boundary=_bounded(table.boundary, factors, str(file)),
     )
 
 
@@ -267,6 +274,13 @@ def _factor(table: _FactorTable, inputs: Inputs, file: str) -> Factor:
         basis=table.basis,
         source=table.source,
     )
+
+
+def _bounded(name: str | None, factors: tuple[Factor, ...], file: str) -> str | None:
+    """Return the name of a factor whose levels can be ordered."""
+    if name is not None and not all(factor.numeric for factor in factors if factor.name == name):
+        raise InputError(f"{file}: boundary is {name}; its values must be numbers")
+    return name
 
 
 def _check_key(key: str, relative: bool, inputs: Inputs, where: str) -> None:
