@@ -34,15 +34,15 @@ def test_a_delay_of_100_ms_and_a_lever_arm_wrong_by_5_cm_are_found():
 
 
 def test_errors_are_as_the_covariance_says():
-    """The sum of normalised squares over 30 drives lies within the 99.9 % band of its chi-square."""
+    """The sum of normalised squares over 15 drives lies within the 99.9 % band of its chi-square."""
     total = 0.0
-    for seed in range(30):
+    for seed in range(15):
         log = DRIVE.log(T, ANTENNA, 0.0143, seed=100 + seed)
         found = estimate(log, STAMPS, measured(STAMPS + 0.03, 200 + seed), 0.0143, SENSOR - ANTENNA)
         error = found.values - [-0.03, *(SENSOR - ANTENNA)]
         total += error @ np.linalg.solve(found.covariance, error)
     # Between two fixes their white noise averages out, so the covariance is somewhat on the safe side.
-    assert chi2.ppf(0.0005, 120) * 0.7 < total < chi2.ppf(0.9995, 120)
+    assert chi2.ppf(0.0005, 60) * 0.7 < total < chi2.ppf(0.9995, 60)
 
 
 def test_mounting_angles_of_the_boom_are_found():
