@@ -98,6 +98,7 @@ for _command in (
     control.control,
     field.geotag,
     field.plots,
+    field.scan,
     link.link,
     files.export,
     files.export_model,

@@ -6,17 +6,33 @@ import click
 import numpy as np
 
 from boom_model import InputError
-from boom_model.plausible import Range
-from planner.cli.completion import OutFile
-from planner.cli.options import all_option, boom_option, json_option, load_boom, outputs, payload_option, plausible
-from planner.cli.printing import print_files, print_json, print_lines, print_rows
+from boom_model.plausible import OFFSET, RATE, Range
+from planner.cli.completion import OneOf, OutFile
+from planner.cli.options import (
+    all_option,
+    boom_option,
+    constraint_option,
+    json_option,
+    load_boom,
+    outputs,
+    payload_option,
+    plausible,
+)
+from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows, tracked
 
 if TYPE_CHECKING:
     from planner.field.plots import Located, PlotMap
+    from planner.field.scan import Scan
     from planner.field.sensor_tags import SensorTags
+    from planner.planning import Move
 
 _EPSG = Range(1024, 999_999, "")
 _GAP = Range(1e-3, 1e4, "s")
+_SIDE = Range(0.01, 100.0, "m")
+_BESIDE = Range(0.1, 30.0, "m")
+_SHARE = Range(0.0, 0.9, "")
+_PACE = Range(0.01, 10.0, "m/s")
+_PROFILES = ("cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal")
 _SURE = 0.95
 _FEW = 3
 
@@ -156,6 +172,169 @@ def plots(
     print_files(written)
     print_lines("next", [] if out else [f"boom plots {source} --out plots.geojson --picture plots.png"])
     return 0
+
+
+@click.command()
+@click.argument("source", metavar="MAP")
+@click.option("--footprint", required=True, metavar="M,M", help="What the sensor sees: along the arm, across it.")
+@click.option(
+    "--rate", type=float, default=4.0, show_default=True, callback=plausible(RATE), metavar="HZ", help="Of the sensor."
+)
+@click.option(
+    "--tip-height",
+    type=float,
+    default=0.9,
+    show_default=True,
+    callback=plausible(OFFSET),
+    metavar="M",
+    help="Of the tip over the mount: canopy and distance, less the mount's height.",
+)
+@click.option(
+    "--offset",
+    type=float,
+    callback=plausible(_BESIDE),
+    metavar="M",
+    help="From the track to the middle of a row; default: where the fewest stops do.",
+)
+@click.option(
+    "--overlap",
+    type=float,
+    default=0.1,
+    show_default=True,
+    callback=plausible(_SHARE),
+    metavar="SHARE",
+    help="Of two lines beside each other.",
+)
+@click.option("--speed", type=float, callback=plausible(_PACE), metavar="M/S", help="Drive past the plots; default: stop.")
+@click.option(
+    "--drive-speed",
+    type=float,
+    default=1.0,
+    show_default=True,
+    callback=plausible(_PACE),
+    metavar="M/S",
+    help="From stop to stop.",
+)
+@click.option("--profile", type=OneOf(_PROFILES), default="jerk-limited", show_default=True, help="How the moves are timed.")
+@constraint_option
+@click.option("--mission", type=OutFile(".toml"), metavar="FILE.toml", help="The scan as a mission, for boom mission and size.")
+@click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="The plots with their coverage.")
+@click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Plots, coverage and track.")
+@payload_option
+@_epsg_option
+@boom_option
+@all_option
+@json_option
+def scan(
+    source: str,
+    footprint: str,
+    mission: str | None,
+    out: str | None,
+    picture: str | None,
+    payload: float | None,
+    epsg: int | None,
+    boom_file: str | None,
+    whole: bool,
+    as_json: bool,
+    **figures: Any,
+) -> int:
+    """Plan a row scan: where the vehicle stops or passes, the boom's moves, and the coverage of each plot.
+
+    \b
+    Examples:
+      boom scan trial.toml --footprint 0.5,0.5 --mission scan.toml --picture scan.png
+      boom scan trial.toml --footprint 0.5,0.5 --speed 0.5
+    """
+    from boom_model.words import numbers
+    from planner.field.plot_files import read_plots, write_plots
+    from planner.field.plot_picture import write_picture
+    from planner.field.scan import ScanTask, plan_scan
+
+    files = outputs(mission, out, picture, inputs=(source, boom_file))
+    along, across = numbers(footprint, footprint, 2)
+    _SIDE.require("footprint", (along, across))
+    boom, field = load_boom(boom_file, payload), read_plots(source, epsg)
+    found = plan_scan(boom, field, ScanTask((along, across), **figures), tracked("planning"))
+    columns: dict[str, list[Any]] = {
+        "coverage": [round(float(x), 4) for x in found.coverage],
+        "overlap": [round(float(x), 2) for x in found.overlap],
+        "time_s": [round(float(x), 1) for x in found.seconds],
+        "energy_J": [round(float(x), 1) for x in found.energy],
+        "reason": [found.unreachable.get(name, "") for name in field.names],
+    }
+    with files:
+        if mission is not None:
+            with open(files.temporary(mission), "w", encoding="utf-8") as file:
+                file.write(found.mission)
+        if out is not None:
+            write_plots(field, files.temporary(out), columns)
+        if picture is not None:
+            write_picture(files.temporary(picture), field, coverage=found.coverage, track=found.track)
+    names = (("mission", mission), ("plots", out), ("picture", picture))
+    written = {kind: name for kind, name in names if name is not None}
+    if as_json:
+        print_json(_scan_json(found, columns, written))
+    else:
+        _print_scan(found, whole)
+        print_files(written)
+        then = f"boom mission {mission}" if mission else f"boom scan {source} --footprint {footprint} --mission scan.toml"
+        print_lines("next", [then])
+    failed = _failed(found)
+    if failed:
+        complain(failed)
+    return ANSWER_IS_NO if failed else 0
+
+
+def _failed(found: "Scan") -> str:
+    """Why the answer is no: a move's check fails, or a plot is not reached; else nothing."""
+    from planner.checks.rows import Verdict
+
+    bad = [name for name, move in found.moves.items() if move.report.verdict is Verdict.FAIL]
+    lost = found.unreachable
+    reason = next(iter(lost.values()), "")
+    said = [f"{len(bad)} moves FAIL, the first {bad[0]}"] if bad else []
+    return "; ".join(
+        said + ([f"{len(lost)} of {len(found.plots.names)} plots are not reached whole: {reason}"] if lost else [])
+    )
+
+
+def _print_scan(found: "Scan", whole: bool) -> None:
+    task, n = found.task, len(found.plots.names)
+    stops = sum(len(visit.stops) for visit in found.visits)
+    how = f"{stops} stops" if task.speed is None else f"passes at {task.speed:g} m/s"
+    lines = len(found.visits[0].lines)
+    print_lines(None, [f"{found.plots.source}: {n} plots, {how}, {lines} lines a plot, track at {found.offset:g} m"])
+    share = f"{found.coverage.min():.1%} to {found.coverage.max():.1%} of each plot seen"
+    print_lines(None, [f"{share}, each spot {found.overlap.mean():.1f} times; {found.seconds.sum() / 60:.0f} min over plots"])
+    listed = list(zip(found.plots.names, found.coverage, found.overlap, found.seconds, found.energy, strict=True))
+    rows = [(name, f"{c:.1%}", f"{o:.1f}", f"{t:.1f} s", f"{e:.1f} J") for name, c, o, t, e in listed]
+    print_rows(("plot", "seen", "times", "time", "work of joints"), rows if whole else rows[:_FEW])
+    print_lines(None, [f"{n - _FEW} more plots: --all lists them"] if n > _FEW and not whole else [])
+    moves = [
+        (name.replace("tip=", ""), f"{move.report.duration:.2f} s", str(move.report.verdict), f"{_worst(move):.3f}")
+        for name, move in found.moves.items()
+    ]
+    print_rows(("move", "time", "verdict", "worst ratio"), moves if whole else moves[:_FEW])
+    print_lines(None, [f"{len(moves) - _FEW} more moves: --all lists them"] if len(moves) > _FEW and not whole else [])
+    crossed = f"the track crosses {found.crossed} plots, so the vehicle must straddle them"
+    print_lines("note", [crossed] if found.crossed else [])
+    print_lines("note", ["turns at the ends of rows, and shocks while driving, are not counted"])
+    print_lines("note", found.plots.notes if whole else [])
+
+
+def _worst(move: "Move") -> float:
+    """The largest demand over limit of a move's certificate."""
+    certificate = move.report.certificate
+    return max((worst.ratio for worst in certificate.worst), default=0.0) if certificate is not None else 0.0
+
+
+def _scan_json(found: "Scan", columns: dict[str, list[Any]], written: dict[str, str]) -> dict[str, Any]:
+    plots = [{"plot": name, **{key: values[k] for key, values in columns.items()}} for k, name in enumerate(found.plots.names)]
+    moves = [
+        {"move": name, "duration_s": move.report.duration, "verdict": str(move.report.verdict), "worst_ratio": _worst(move)}
+        for name, move in found.moves.items()
+    ]
+    return {"offset_m": found.offset, "stops": len(found.track), "plots": plots, "moves": moves, "files": written}
 
 
 def _map_at(field: "PlotMap", tags: "SensorTags") -> "PlotMap":

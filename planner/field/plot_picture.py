@@ -44,7 +44,9 @@ def map_figure(
     return figure
 
 
-def write_picture(path: str | Path, plots: PlotMap, points: Array | None = None, coverage: Array | None = None) -> None:
+def write_picture(
+    path: str | Path, plots: PlotMap, points: Array | None = None, *, coverage: Array | None = None, track: Array | None = None
+) -> None:
     """Write `map_figure` as .png."""
     known = None if points is None else points[np.isfinite(points).all(axis=-1)]
-    map_figure(plots, known, coverage).savefig(path, dpi=120, format="png")
+    map_figure(plots, known, coverage, track).savefig(path, dpi=120, format="png")

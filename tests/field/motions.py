@@ -23,6 +23,8 @@ class Drive:
     """[rad] of roll and pitch"""
     begin: float = 0.7
     """[rad] heading at the start"""
+    heave: float = 0.02
+    """[m]"""
     frame: LocalFrame = SASKATOON
 
     def origin(self, t: Array) -> Array:
@@ -31,7 +33,7 @@ class Drive:
         radius = self.speed / self.turning
         east = radius * (np.cos(self.begin) - np.cos(heading))
         north = radius * (np.sin(heading) - np.sin(self.begin))
-        return np.stack([east, north, 0.02 * np.sin(2.0 * t)], axis=-1)
+        return np.stack([east, north, self.heave * np.sin(2.0 * t)], axis=-1)
 
     def angles(self, t: Array) -> Array:
         """(n, 3) roll, pitch, heading [rad]."""

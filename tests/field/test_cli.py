@@ -10,6 +10,8 @@ from boom_model import Boom
 from planner.field.earth import ecef_of
 from tests.field.field_files import FRAME, joint_position, true_spots, write_field
 from tests.field.motions import Drive
+from tests.field.trials import TRIAL as FORTY
+from tests.field.trials import corners
 
 TRIAL = """
 name = "four plots"
@@ -109,3 +111,36 @@ def test_plots_refuses(arguments, boom, day):
     code, _, error = boom("plots", *arguments)
     assert code == 2
     assert error.startswith("boom: ")
+
+
+def test_scan(boom, tmp_path):
+    (tmp_path / "trial.toml").write_text(FORTY.format(corners=np.degrees(corners()).tolist()))
+    asked = ("scan", "trial.toml", "--footprint", "0.5,0.5", "--profile", "cubic")
+    code, out, error = boom(*asked, "--mission", "scan.toml", "--out", "scan.geojson", "--picture", "scan.png")
+    assert (code, error) == (0, "")
+    assert len(out.splitlines()) <= 24
+    assert "40 plots, 80 stops, 3 lines a plot" in out
+    assert "the track crosses" in out
+    properties = json.loads((tmp_path / "scan.geojson").read_text())["features"][0]["properties"]
+    assert properties["coverage"] >= 0.99
+    code, out, _ = boom(*asked, "--json", "--speed", "0.5")
+    answer = json.loads(out)
+    assert code == 0
+    assert min(plot["coverage"] for plot in answer["plots"]) >= 0.99
+    code, out, error = boom(*asked, "--speed", "0.5", "--offset", "2.2")
+    assert code == 1
+    assert "40 of 40 plots are not reached whole" in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(("options", "code", "message"), [
+    (("--footprint", "0.5"), 2, "has 1 numbers; it needs 2"),
+    (("--footprint", "0,0.5"), 2, "footprint is 0 m"),
+    (("--footprint", "0.5,0.5", "--speed", "3"), 1, "1.8 m/s is the fastest"),
+    (("--footprint", "0.5,0.5", "--offset", "9"), 1, "no plot can be reached"),
+])  # fmt: skip
+def test_scan_refuses(options, code, message, boom, tmp_path):
+    (tmp_path / "trial.toml").write_text(FORTY.format(corners=np.degrees(corners()).tolist()))
+    given, _, error = boom("scan", "trial.toml", *options)
+    assert (given, error.count("\n")) == (code, 1)
+    assert message in error

@@ -9,36 +9,11 @@ from geographiclib.geodesic import Geodesic
 from scipy.stats import multivariate_normal, norm
 
 from boom_model import InputError
-from planner.field.earth import coordinates_in, ecef_of, geodetic_of
+from planner.field.earth import coordinates_in, ecef_of
 from planner.field.plot_files import FORMS, read_plots, write_plots
 from planner.field.plots import PlotMap, lay_out, locate, require_near, shares
 from planner.field.polygons import probability
-from tests.field.motions import SASKATOON
-
-TRIAL = """
-name = "forty plots"
-basis = "assumed"
-source = "a test"
-rows = 10
-ranges = 4
-plot_m = [1.2, 3.6]
-alley_m = [0.3, 1.5]
-height_m = 480.0
-corners = {corners}
-"""
-ACROSS, ALONG = 10 * 1.2 + 9 * 0.3, 4 * 3.6 + 3 * 1.5
-
-
-def corners(count=4, angle=0.4, side=1.0):
-    """Latitude and longitude of the trial's corners [rad]."""
-    flat = np.array([[0.0, 0.0], [ALONG, 0.0], [ALONG, side * ACROSS], [0.0, side * ACROSS]])[:count]
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    ecef = SASKATOON.ecef(np.column_stack([flat @ turn.T, np.zeros(count)]))
-    return np.column_stack(geodetic_of(ecef)[:2])
-
-
-def trial(count=4, **given):
-    return lay_out(corners(count, **given), 10, 4, (1.2, 3.6), (0.3, 1.5), height=480.0)
+from tests.field.trials import TRIAL, corners, trial
 
 
 @pytest.mark.parametrize(("count", "side"), [(2, 1.0), (3, 1.0), (4, 1.0), (3, -1.0), (4, -1.0)])
