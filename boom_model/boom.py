@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
+from boom_model.calibration import Calibration
 from boom_model.drives.drive import Drive
 from boom_model.drives.linear_actuator import LinearDrive
 from boom_model.errors import InputError
@@ -274,6 +275,8 @@ class Boom:
     """Linear actuator of the extension; None if not given."""
     keep_out: KeepOut | None = None
     """Shapes to avoid; None if not given."""
+    calibration: Calibration | None = None
+    """Offsets of the joint readings and uncertainty; None where the machine was not measured."""
 
     def __post_init__(self) -> None:
         GRAVITY.require("gravity", scalar("gravity", self.gravity))

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from boom_model.arrays import Array, checked, read_only
 from boom_model.boom import JOINTS, MOVING_BODIES, Body, Boom, Friction, Geometry, Limits, Mount
+from boom_model.calibration import Calibration
 from boom_model.drives.catalogue import CATALOGUE_FILE, Catalogue
 from boom_model.drives.drive import Drive, Wiring
 from boom_model.drives.linear_actuator import LinearDrive
@@ -53,6 +54,10 @@ Triple = Annotated[list[_Offset], Field(min_length=3, max_length=3)]
 _Place = Annotated[list[Annotated[float, POSITION]], Field(min_length=3, max_length=3)]
 _Gap = Annotated[float, CLEARANCE]
 _Viscous = Annotated[float, VISCOUS_FRICTION]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+_Spread = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+_Factor = Annotated[float, Field(ge=-10, le=100, allow_inf_nan=False)]
+_Scale = Annotated[float, Field(ge=0.5, le=2, allow_inf_nan=False)]
 _Coulomb = Annotated[float, COULOMB_FRICTION]
 
 
@@ -277,18 +282,58 @@ class _KeepOutTable(_Origin):
         return self
 
 
-class _PayloadTable(_Origin):
-    mass_kg: _Mass
-    com_m: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
-    inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)] = Field(default_factory=lambda: read_only(np.zeros((3, 3))))
-
-
 class _PoseTable(Table):
     yaw_deg: Annotated[float, ANGLE]
     inner_deg: Annotated[float, ANGLE]
     lower_deg: Annotated[float, ANGLE]
     extension_m: _Offset
     wrist_deg: Annotated[float, ANGLE]
+
+
+class _WindUpTable(Table):
+    yaw: _Factor = 1.0
+    inner: _Factor = 1.0
+    lower: _Factor = 1.0
+    wrist: _Factor = 1.0
+
+
+class _UncertaintyTable(Table):
+    parameters: list[str]
+    standard_deviation: list[_Spread]
+    covariance: list[list[_Finite]]
+
+
+class _CalibrationTable(_Origin):
+    offset: _PoseTable
+    extension_scale: _Scale = 1.0
+    wind_up: _WindUpTable = Field(default_factory=lambda: _WindUpTable())
+    uncertainty: _UncertaintyTable
+
+    @property
+    def calibration(self) -> Calibration:
+        yields, count = self.wind_up, len(self.uncertainty.parameters)
+        return Calibration(
+            origin=self.origin,
+            offset=_pose(self.offset),
+            scale=read_only([1.0, 1.0, 1.0, self.extension_scale, 1.0]),
+            wind_up=read_only([yields.yaw, yields.inner, yields.lower, 1.0, yields.wrist]),
+            parameters=tuple(self.uncertainty.parameters),
+            covariance=read_only(np.reshape(self.uncertainty.covariance, (count, count))),
+        )
+
+    @model_validator(mode="after")
+    def _square(self) -> "_CalibrationTable":
+        count = len(self.uncertainty.parameters)
+        rows = [len(row) for row in self.uncertainty.covariance]
+        if rows != [count] * count or len(self.uncertainty.standard_deviation) != count:
+            raise ValueError(f"uncertainty must have {count} standard deviations and a covariance of {count} by {count}")
+        return self
+
+
+class _PayloadTable(_Origin):
+    mass_kg: _Mass
+    com_m: Triple = Field(default_factory=lambda: [0.0, 0.0, 0.0])
+    inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)] = Field(default_factory=lambda: read_only(np.zeros((3, 3))))
 
 
 class _BoomTable(Table):
@@ -302,6 +347,7 @@ class _BoomTable(Table):
     mount: _MountTable = Field(default_factory=_MountTable)
     poses: dict[str, _PoseTable] = Field(default_factory=dict)
     keep_out: _KeepOutTable | None = None
+    calibration: _CalibrationTable | None = None
 
 
 def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
@@ -350,6 +396,7 @@ def _boom(file: str, table: _BoomTable, known: Catalogue, searched: str) -> Boom
         actuator=_linear_drive(file, table.joints.extension.actuator, known, searched),
         poses=MappingProxyType(poses),
         keep_out=None if table.keep_out is None else _keep_out(table.keep_out),
+        calibration=None if table.calibration is None else table.calibration.calibration,
     )
 
 
