@@ -331,7 +331,7 @@ def _print_scan(found: "Scan", whole: bool) -> None:
 
 
 def _worst(move: "Move") -> float:
-    """The largest demand over limit of a move's certificate."""
+    """Return the largest demand over limit of a move's certificate."""
     certificate = move.report.certificate
     return max((worst.ratio for worst in certificate.worst), default=0.0) if certificate is not None else 0.0
 
@@ -346,7 +346,7 @@ def _scan_json(found: "Scan", columns: dict[str, list[Any]], written: dict[str, 
 
 
 def _map_at(field: "PlotMap", tags: "SensorTags") -> "PlotMap":
-    """The map with its ground at the height of what was seen, checked to be where the log is."""
+    """Return the map with its ground at the height of what was seen, checked to be where the log is."""
     from planner.field.plots import require_near
 
     latitude, longitude, height = tags.seen.geodetic

@@ -149,7 +149,7 @@ def _read_geojson(path: str | Path, epsg: int | None) -> PlotMap:
 
 
 def _code_of(path: str | Path, data: dict[str, Any], epsg: int | None) -> int:
-    """The EPSG code of GeoJSON's old member crs; RFC 7946 knows WGS 84 alone."""
+    """Return the EPSG code of GeoJSON's old member crs; RFC 7946 knows WGS 84 alone."""
     crs = data.get("crs")
     if crs is None:
         return GEOGRAPHIC if epsg is None else epsg
@@ -287,7 +287,7 @@ def _degrees(ring: Array) -> list[list[float]]:
 
 
 def _wound(plots: PlotMap, i: int, *, anticlockwise: bool) -> list[list[list[float]]]:
-    """The rings of a plot [deg], the outer one in a sense, its holes in the other."""
+    """Return the rings of a plot [deg], the outer one in a sense, its holes in the other."""
     wound = []
     for k, ring in enumerate(plots.rings[i]):
         x, y = plots.plane(ring[:, 0], ring[:, 1]).T
