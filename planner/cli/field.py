@@ -49,6 +49,7 @@ _epsg_option = click.option(
 @click.option("--plots", type=click.Path(), metavar="MAP", help="Plot map: which plot was seen, and how probably.")
 @click.option("--out", type=OutFile(".csv"), metavar="FILE.csv", help="The tags as a table.")
 @click.option("--geojson", type=OutFile(".geojson", ".json"), metavar="FILE.geojson", help="The tags for QGIS.")
+@click.option("--recording", type=OutFile(".rrd"), metavar="FILE.rrd", help="Vehicle, boom and plots in 3D, and a map.")
 @click.option(
     "--to-epsg", type=int, callback=plausible(_EPSG), metavar="CODE", help="Reference system written; default: the UTM zone."
 )
@@ -66,6 +67,7 @@ def geotag(
     plots: str | None,
     out: str | None,
     geojson: str | None,
+    recording: str | None,
     to_epsg: int | None,
     gap: float | None,
     epsg: int | None,
@@ -90,10 +92,11 @@ def geotag(
     from planner.field.sensor_tags import tag_sensor
     from planner.field.tag_files import rows_of, write_csv, write_geojson
 
-    files = outputs(out, geojson, inputs=(vehicle, joints, triggers, rig, plots, boom_file))
+    files = outputs(out, geojson, recording, inputs=(vehicle, joints, triggers, rig, plots, boom_file))
     boom = load_boom(boom_file, payload)
     log = read_vehicle_log(vehicle, epsg, gap)
-    tags = tag_sensor(boom, read_rig(rig), log, read_joint_log(joints), read_triggers(triggers))
+    placed = read_rig(rig)
+    tags = tag_sensor(boom, placed, log, read_joint_log(joints), read_triggers(triggers))
     field = None if plots is None else _map_at(read_plots(plots, None), tags)
     located = None if field is None else _located(field, tags)
     code = _zone(tags) if to_epsg is None else to_epsg
@@ -103,7 +106,12 @@ def geotag(
             write_csv(files.temporary(out), rows)
         if geojson is not None:
             write_geojson(files.temporary(geojson), tags, rows)
-    written = {kind: name for kind, name in (("tags", out), ("map", geojson)) if name is not None}
+        if recording is not None:
+            from planner.recording.field import write_field_recording  # slow to import
+
+            write_field_recording(files.temporary(recording), boom, placed, tags, field, located)
+    names = (("tags", out), ("map", geojson), ("recording", recording))
+    written = {kind: name for kind, name in names if name is not None}
     if as_json:
         print_json({"tags": rows, "epsg": code, "warnings": tags.warnings, "notes": _notes(tags, field), "files": written})
         return 0
@@ -323,7 +331,7 @@ def _print_scan(found: "Scan", whole: bool) -> None:
 
 
 def _worst(move: "Move") -> float:
-    """The largest demand over limit of a move's certificate."""
+    """Return the largest demand over limit of a move's certificate."""
     certificate = move.report.certificate
     return max((worst.ratio for worst in certificate.worst), default=0.0) if certificate is not None else 0.0
 

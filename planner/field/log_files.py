@@ -66,7 +66,7 @@ class Triggers:
 
 
 def read_vehicle_log(path: str | Path, epsg: int | None = None, longest_gap: float | None = None) -> VehicleLog:
-    """Read the log of a vehicle: NMEA (.nmea, .txt, .log, .ubx are not told apart by their ends but by a first `$`), or CSV.
+    """Read the log of a vehicle: NMEA if it begins with `$` or `!`, otherwise CSV.
 
     Args:
         path: the file.

@@ -57,11 +57,16 @@ PLANNED = Place("world/planned", "planned ")
 
 def log_mount(recording: rr.RecordingStream, t: Array, vehicle: VehicleCase | None) -> None:
     """Log the frame "mount" (frame 1 of the boom) with its plate, moving with the vehicle."""
+    T = np.eye(4)[None] if vehicle is None or vehicle.is_level else base_pose(vehicle, t)
+    log_mount_poses(recording, t[: len(T)], T)
+
+
+def log_mount_poses(recording: rr.RecordingStream, t: Array, T: Array) -> None:
+    """Log the frame "mount" with its plate, at poses T (n, 4, 4) in the world."""
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     plate = boxes(np.array([[-0.2, -0.2, -0.02]]), np.array([[0.2, 0.2, 0.0]]), PIN_COLOR)
     recording.log("world/mount", plate, rr.CoordinateFrame("mount"), static=True)
-    T = np.eye(4)[None] if vehicle is None or vehicle.is_level else base_pose(vehicle, t)
-    _log_poses(recording, "world/mount", T, "tf#/world", "mount", t[: len(T)])
+    _log_poses(recording, "world/mount", T, "tf#/world", "mount", t)
 
 
 def log_motion(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, place: Place = BOOM) -> None:

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
 from boom_model import Boom
 from planner.field.earth import ecef_of
@@ -51,6 +52,13 @@ def test_geotag_writes_where_the_sensor_was(boom, day, tmp_path):
     features = json.loads((tmp_path / "tags.geojson").read_text())["features"]
     assert {feature["properties"]["of"] for feature in features} == {"sensor", "footprint"}
     assert len(features) == 2 * 79
+
+
+def test_geotag_records_boom_plots_and_map(boom, day, tmp_path):
+    code, out, _ = boom(*day, "--plots", "trial.toml", "--recording", "tags.rrd")
+    assert (code, "recording: tags.rrd" in out) == (0, True)
+    entities = set(RrdReader(tmp_path / "tags.rrd").store().schema().entity_paths())
+    assert {"/world/plots", "/world/spots", "/world/mount", "/map/plots", "/map/sensor", "/reading"} <= entities
 
 
 def test_geotag_json(boom, day):
