@@ -12,7 +12,7 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, field, files, kinematics, link, moves, page, require, study, view
+from planner.cli import control, data, drives, experiments, field, files, kinematics, link, moves, page, require, study, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -103,6 +103,7 @@ for _command in (
     files.export,
     files.export_model,
     files.compare,
+    experiments.calibrate,
     files.validate,
     view.view,
     page.jog,

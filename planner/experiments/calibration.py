@@ -54,7 +54,7 @@ USUAL_SD = 1e-3
 _HELD_FIRST = ("extension offset", "yaw offset", "L1", "L3", *WIND_UPS, SCALE, SIDEWAYS, "wrist offset", UPPER, INNER)
 """Parameters that are held before others that the data cannot tell them from."""
 
-_SHARE, _ALIKE = 0.3, 0.05  # of the largest component of a direction, from which a parameter may be held for it, or is named
+_SHARE = 0.3  # of the largest component of a direction, from which a parameter takes part in it
 _STARTS = 3  # fits with the noise or the wind-up of the one before
 _REJECTED = 0.001  # chance that a set of good poses loses one
 _LARGEST_REJECTED = 0.25
@@ -80,6 +80,8 @@ class Calibrated:
 
     boom: Boom
     """With the measured lengths and `calibration`."""
+    start: Boom
+    """As it was before."""
     model: TipModel
     """With the place of the boom in the measuring frame."""
     parameters: tuple[Parameter, ...]
@@ -114,6 +116,11 @@ class Calibrated:
         """Whether the links of the linkage differ."""
         return not self.boom.geometry.is_parallelogram
 
+    @property
+    def held_out_rms(self) -> float:
+        """RMS distance of the used poses, each as if it had not been used [m]."""
+        return rms(self.held_out[self.used])
+
     def predicted(self, readings: ArrayLike) -> tuple[Array, Array]:
         """Return tip positions (n, 3) in the measuring frame and their covariance (n, 3, 3) at readings (n, 5).
 
@@ -124,6 +131,37 @@ class Calibrated:
         yields = printed_wind_up(self.model.boom, self.model.joints(q, np.zeros_like(q)))
         J = self.model.derivative(self.free, q, yields)
         return self.model.tip(q, yields), J @ self.covariance @ np.swapaxes(J, -1, -2)
+
+    def checked_on(self, other: Measurements) -> "Check":
+        """Return how well tips that were not used are predicted, in the same frame.
+
+        Raises:
+            InputError: fewer than 3 poses have all three coordinates, or all tips are on one line.
+        """
+        at, C = self.predicted(other.readings)
+        start = TipModel.of(self.start, self.model.target)
+        yields = printed_wind_up(start.boom, start.joints(other.readings, np.zeros_like(other.readings)))
+        before = start.tip(other.readings, yields)
+        if set(BASE) & set(self.free):
+            frame = aligned(before, other.tip)
+            before = before @ frame.R.T + frame.t
+        spread = np.sqrt(np.trace(C, axis1=1, axis2=2).mean())
+        if other.tip_sd is not None:
+            noise = np.square(np.where(np.isfinite(other.tip), other.tip_sd, 0.0)).sum(axis=-1)
+            spread = np.sqrt(spread**2 + noise.mean())
+        return Check(len(other.tip), rms(other.tip - before), rms(other.tip - at), float(spread))
+
+
+@dataclass(frozen=True)
+class Check:
+    """Errors of tips that a calibration has not used, RMS distances [m]."""
+
+    poses: int
+    before: float
+    """Of the boom before, in its best place."""
+    after: float
+    expected: float
+    """From the covariance, and the stated noise where there is one."""
 
 
 def rms(errors: Array) -> float:
@@ -333,13 +371,21 @@ def _told(
         parts = np.abs(Vt[least])
         involved = [name for name, part in zip(free, parts, strict=True) if part >= _SHARE * parts.max()]
         held = next((name for name in (*_HELD_FIRST, *free) if name in involved and name not in BASE), involved[0])
-        alike = [name for name, part in zip(free, parts, strict=True) if part >= _ALIKE * parts.max() and name != held]
-        dropped.append((held, tuple(alike), float(sizes[least])))
         free.remove(held)
+        dropped.append((held, _alike(J, names, held, free), float(sizes[least])))
         if not free:
             raise InputError(
                 f"{whiten.measured.name}: the poses tell nothing of the boom; measure poses that differ in each joint"
             )
+
+
+def _alike(J: Array, names: tuple[str, ...], held: str, free: list[str]) -> tuple[str, ...]:
+    """Return the parameters that move the tips as a held one does; none if that moves them by less than the noise."""
+    own, others = J[:, names.index(held)], J[:, [names.index(name) for name in free]]
+    if np.linalg.norm(own) < 1.0:
+        return ()
+    parts = np.abs(np.linalg.lstsq(others, own)[0]) * np.linalg.norm(others, axis=0)
+    return tuple(name for name, part in zip(free, parts, strict=True) if part >= _SHARE * parts.max(initial=0.0))
 
 
 def _closed(
@@ -416,6 +462,7 @@ def _result(
     boom = _measured_boom(measured, start.boom, fit, covariance)
     return Calibrated(
         boom=boom,
+        start=start.boom,
         model=replace(fit.model, boom=boom),
         parameters=parameters,
         free=fit.names,
@@ -449,7 +496,7 @@ def _parameters(start: TipModel, fit: _Fit, covariance: Array) -> tuple[Paramete
 def _measured_boom(measured: Measurements, boom: Boom, fit: _Fit, covariance: Array) -> Boom:
     model = fit.model
     count = int(fit.used.sum())
-    kept = [k for k, name in enumerate(fit.names) if name not in BASE]
+    kept = [k for k, name in enumerate(fit.names) if name not in (*BASE, SIDEWAYS)]
     calibration = Calibration(
         origin=Origin(Basis.MEASURED, f"boom calibrate {measured.name}: {count} poses"),
         offset=model.offset,
