@@ -12,7 +12,22 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, experiments, field, files, kinematics, link, moves, page, require, study, view
+from planner.cli import (
+    control,
+    data,
+    drives,
+    experiments,
+    field,
+    files,
+    identify,
+    kinematics,
+    link,
+    moves,
+    page,
+    require,
+    study,
+    view,
+)
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -104,6 +119,7 @@ for _command in (
     files.export_model,
     files.compare,
     experiments.calibrate,
+    identify.identify,
     files.validate,
     view.view,
     page.jog,

@@ -356,7 +356,8 @@ def _told(
     whiten: _Whitened, model: TipModel, names: tuple[str, ...], good: Mask | None = None
 ) -> tuple[tuple[str, ...], tuple[_Dropped, ...], Array]:
     """Return the parameters that the data tell; those held, with what they are like and how badly they are told; and the
-    singular values."""
+    singular values.
+    """
     J = whiten.derivative(model, names)
     J = (J if good is None else J[good]).reshape(-1, len(names))
     free, dropped = list(names), list[_Dropped]()
