@@ -1,13 +1,10 @@
 """Time of the whole command, against a process that only imports Rerun, which every recording needs."""
 
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
-
-import pytest
-
-resource = pytest.importorskip("resource", reason="only POSIX gives the time of a process that has ended")
 
 ROUNDS = 3
 """Runs of each process in turn. The quickest counts."""
