@@ -308,7 +308,7 @@ class _Whitened:
         self.inverse = np.linalg.inv(np.linalg.cholesky(C))
 
     def residuals(self, model: TipModel) -> Array:
-        """(n, 3), 0 where not measured"""
+        """Return the residuals (n, 3), 0 where not measured."""
         off = np.where(self.finite, self.measured.tip - model.tip(self.measured.readings, self.yields), 0.0)
         return np.asarray((self.inverse @ off[..., None])[..., 0])
 
@@ -355,8 +355,9 @@ def _good(whiten: _Whitened, model: TipModel, count: int) -> Mask:
 def _told(
     whiten: _Whitened, model: TipModel, names: tuple[str, ...], good: Mask | None = None
 ) -> tuple[tuple[str, ...], tuple[_Dropped, ...], Array]:
-    """Return the parameters that the data tell; those held, with what they are like and how badly they are told; and the
-    singular values.
+    """Return the parameters that the data tell, those held, and the singular values.
+
+    A held parameter says what it is like, and how badly the data tell it.
     """
     J = whiten.derivative(model, names)
     J = (J if good is None else J[good]).reshape(-1, len(names))

@@ -43,7 +43,8 @@ def consistent_fit(unknowns: Unknowns, H: Array, b: Array) -> Array:
     scale = 1.0 / np.sqrt(np.diag(H)[active])
     rows, right, cones = [], [], []
     P0, root = unknowns.metric
-    order = [_UPPER.index((int(r), int(c))) for r, c in zip(_ROW, _COLUMN, strict=True)]
+    upper = [(int(r), int(c)) for r, c in _UPPER]
+    order = [upper.index((int(r), int(c))) for r, c in zip(_ROW, _COLUMN, strict=True)]
     for k in range(len(P0)):
         inverse = np.linalg.inv(root[k])
         start = inverse @ P0[k] @ inverse - LEAST_EIGENVALUE * np.eye(4)

@@ -30,9 +30,10 @@ PERIOD, HARMONICS = 20.0, 5
 STEP = 0.01
 """Sampling step [s] of the motion."""
 
-_POINTS = 48
-"""Points of a period at which the criterion looks."""
+ROUNDS = 40
+"""Largest number of iterations of a design, for each of its criteria."""
 
+_POINTS = 48  # of a period, at which the criterion looks
 _FINE = 4000
 _STARTS = 12
 _PENALTY, _TARGET = 300.0, 0.985
@@ -40,7 +41,6 @@ _PENALTY, _TARGET = 300.0, 0.985
 
 _DIFFERENCE = 1e-6
 _SMOOTH = 0.03
-_ROUNDS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +93,7 @@ def design(
     period: float = PERIOD,
     harmonics: int = HARMONICS,
     seed: int = 0,
+    rounds: int = ROUNDS,
     track: Track = iter,
 ) -> Excitation:
     """Return the best motion found from the best of some random ones, by BFGS with a penalty for the limits.
@@ -105,13 +106,16 @@ def design(
         period: [s]
         harmonics: H
         seed: of the random motions.
+        rounds: largest number of iterations, of each criterion.
         track: shows progress over the iterations.
 
     Raises:
         InputError: fewer than 3 harmonics, or the period is not above 0.
         InfeasibleError: no random motion keeps the limits.
     """
-    from scipy.optimize import minimize
+    from scipy.optimize import minimize as scipy_minimize
+
+    minimize: Any = scipy_minimize  # its stubs know no objective that returns its gradient
 
     if harmonics < 3 or not period > 0.0:
         raise InputError(f"{harmonics} harmonics in {period:g} s: at least 3 harmonics and a period above 0 s are needed")
@@ -120,13 +124,15 @@ def design(
     # The condition number is flat far from its least; the way there begins with the information.
     phases = [_Problem(boom, each, period, harmonics) for each in dict.fromkeys(("information", criterion))]
     best = min(starts, key=lambda each: phases[0].cost(phases[0].variables(each)))
-    x, done = phases[0].variables(best), iter(track(list(range(_ROUNDS * len(phases)))))
+    x, done = phases[0].variables(best), iter(track(list(range(rounds * len(phases)))))
     for problem in phases:
-        options = {"maxiter": _ROUNDS, "ftol": 1e-5}
-        found = minimize(
-            problem.cost_and_slope, x, jac=True, method="L-BFGS-B", options=options, callback=lambda _: next(done, None)
-        )
-        x = found.x
+        options: dict[str, Any] = {"maxiter": rounds, "ftol": 1e-5}
+
+        def step(_: Array) -> None:
+            next(done, None)
+
+        found = minimize(problem.cost_and_slope, x, jac=True, method="L-BFGS-B", options=options, callback=step)
+        x = np.asarray(found.x)
     for _ in done:
         pass
     improved = _within_limits(phases[-1].excitation(x))
@@ -156,7 +162,7 @@ def random_excitation(
 
 
 def _within_limits(motion: Excitation) -> Excitation | None:
-    """The motion with its amplitude reduced until it keeps the limits; None if it would have to stand still."""
+    """Return the motion, its amplitude reduced until it keeps the limits; None if it had to stand still."""
     t = np.linspace(0.0, motion.period, _FINE + 1)
     offset = motion(t)[0].mean(axis=0) - motion.centre
 
@@ -209,7 +215,7 @@ def _scaled_regressor(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
 
 def _information(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
     Y = _scaled_regressor(boom, q, qd, qdd)
-    return np.einsum("njk,njl->kl", Y, Y, optimize=True) / len(q)
+    return np.asarray(np.einsum("njk,njl->kl", Y, Y, optimize=True)) / len(q)
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,12 +70,12 @@ def _write(
     except (TOMLKitError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: not valid TOML: {error}") from None
     for name, why in bodies.items():
-        document["bodies"][name].update(_body_table(boom.bodies[name]) | {"basis": "measured", "source": why})  # type: ignore[index, union-attr]
+        document["bodies"][name].update(_body_table(boom.bodies[name]) | {"basis": "measured", "source": why})
     if payload is not None:
-        document["payload"].update(_body_table(boom.payload) | {"basis": "measured", "source": payload})  # type: ignore[union-attr]
+        document["payload"].update(_body_table(boom.payload) | {"basis": "measured", "source": payload})
     for i, joint in enumerate(JOINTS):
         if joint in friction:
-            document["joints"][joint]["friction"] = _friction_table(boom, i, friction[joint])  # type: ignore[index]
+            document["joints"][joint]["friction"] = _friction_table(boom, i, friction[joint])
     with replacing(path) as temporary:
         Path(temporary).write_text(tomlkit.dumps(document), encoding="utf-8")
 
@@ -103,5 +103,5 @@ def _friction_table(boom: Boom, joint: int, why: str) -> dict[str, object]:
 
 
 def _digits(value: float) -> float:
-    """The number with ten significant digits: less would make a thin body's inertia one that no solid has."""
+    """Return the number with ten significant digits: fewer could make an inertia that no solid has."""
     return float(f"{value:.10g}")

@@ -78,8 +78,8 @@ class Readings:
 
     def part(self, samples: slice) -> "Readings":
         """Return some of the samples."""
-        arrays = (x[samples] for x in (self.t, self.q, self.qd, self.qdd, self.tau, self.moving))
-        return Readings(*arrays, self.cutoff, self.position_noise, self.torque_noise, self.filtered, self.notes)
+        t, q, qd, qdd, tau = (x[samples] for x in (self.t, self.q, self.qd, self.qdd, self.tau))
+        return replace(self, t=t, q=q, qd=qd, qdd=qdd, tau=tau, moving=self.moving[samples])
 
 
 def read_torque_log(path: str | Path, torque_per_ampere: ArrayLike | None = None) -> Log:
@@ -131,11 +131,13 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     if cutoff is not None and not 0.0 < cutoff < 0.5 / h:
         raise InputError(f"cutoff is {cutoff:g} Hz; it must be between 0 and {0.5 / h:g} Hz, half the log's sampling rate")
     usable = [cutoff] if cutoff is not None else [f for f in CUTOFFS if f < 0.4 / h] or [0.4 / h]
-    for cutoff in usable:
-        q = _low_pass(even.q, h, cutoff)
-        moving = _moving(np.gradient(q, h, axis=0), noise, h, cutoff)
-        removed = np.sum((even.q - q) ** 2 * moving, axis=0)
-        if (removed <= _REMOVED * noise**2 * moving.sum(axis=0)).all():
+    for chosen in usable:
+        q = _low_pass(even.q, h, chosen)
+        moving = _moving(np.gradient(q, h, axis=0), noise, h, chosen)
+        edge = max(1, int(min(1.0 / chosen, 0.25 * (even.t[-1] - even.t[0])) / h))
+        inside = moving & (np.abs(np.arange(len(q)) - 0.5 * (len(q) - 1)) < 0.5 * len(q) - edge)[:, None]
+        removed = np.sum((even.q - q) ** 2 * inside, axis=0)
+        if (removed <= _REMOVED * noise**2 * inside.sum(axis=0)).all():
             break
     filtered = even.qd is None or even.qdd is None
     if even.qd is not None and even.qdd is not None:
@@ -143,11 +145,9 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     else:
         qd, qdd = np.gradient(q, h, axis=0), np.zeros_like(q)
         qdd[1:-1] = np.diff(q, 2, axis=0) / h**2
-        edge = max(1, int(min(1.0 / cutoff, 0.25 * (even.t[-1] - even.t[0])) / h))
-    inside = slice(edge, len(q) - edge)
-    notes = (*even.notes, f"positions are low-pass filtered at {cutoff:g} Hz, forwards and backwards")
-    whole = Readings(even.t, q, qd, qdd, tau, moving, cutoff, noise, _noise(tau), filtered, notes)
-    return whole.part(inside)
+    notes = (*even.notes, f"positions are low-pass filtered at {chosen:g} Hz, forwards and backwards")
+    whole = Readings(even.t, q, qd, qdd, tau, moving, chosen, noise, _noise(tau), filtered, notes)
+    return whole.part(slice(edge, len(q) - edge))
 
 
 def _moving(qd: Array, noise: Array, step: float, cutoff: float) -> Mask:
@@ -162,7 +162,7 @@ def _moving(qd: Array, noise: Array, step: float, cutoff: float) -> Mask:
 
 
 def _noise(values: Array) -> Array:
-    """Standard deviation (5,) of noise that is independent from sample to sample, by third differences.
+    """Return the standard deviation (5,) of noise that is independent from sample to sample, by third differences.
 
     The median of the absolute values is used: a step in the torque does not count as noise.
     """
