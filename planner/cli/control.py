@@ -138,7 +138,7 @@ def control(
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
     from planner.planning import plan_move
-    from planner.timing.profile import Profile
+    from planner.timing.profile import SHORTEST, Profile
 
     boom, case = load_boom(boom_file, payload), None if move.vehicle is None else load_vehicle(move.vehicle)
     setup = Setup(
@@ -163,7 +163,7 @@ def control(
     if loops is not None and chosen[0] == [Controller.STEPPER]:
         raise InputError("a stepper runs open loop: there is no Bode diagram of it")
     files = outputs(out, loops, errors, document=document, inputs=(boom_file, move.vehicle))
-    words = _several("profile", profiles, list(Profile))
+    words = _several("profile", profiles, list(SHORTEST if move.duration is None else Profile))
     moves = [plan_move(boom, replace(move, profile=word).spec()) for word in words]
     names = [Controller(c) for c in chosen[0]], [Shaper(s) for s in chosen[1]]
     found = study(boom, moves, *names, setup, tracked("simulating"))
