@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from planner.sizing.choice import size as size
     from planner.timing.profile import Cubic as Cubic
     from planner.timing.profile import JerkLimited as JerkLimited
+    from planner.timing.profile import LeastEnergy as LeastEnergy
     from planner.timing.profile import Quintic as Quintic
     from planner.timing.profile import TimeOptimal as TimeOptimal
     from planner.timing.profile import Trapezoidal as Trapezoidal
@@ -43,7 +44,7 @@ _HOMES = {
     "planner.planning": ("Move", "check", "plan", "plan_motion"),
     "planner.reports.report": ("Report",),
     "planner.sizing.choice": ("size",),
-    "planner.timing.profile": ("Cubic", "JerkLimited", "Quintic", "TimeOptimal", "Trapezoidal"),
+    "planner.timing.profile": ("Cubic", "JerkLimited", "LeastEnergy", "Quintic", "TimeOptimal", "Trapezoidal"),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
 

@@ -76,10 +76,10 @@ class MoveSpec:
             pitch: "down", "level", "up", degrees as text, or [rad]; "free" or None lets the
                 constraint choose it.
             along: "joint", "line", "arc=X,Y,Z", or a point (3,) [m] on the arc.
-            profile: "cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal", or a profile
-                with its options, such as TimeOptimal(jerk_bound=True).
+            profile: "cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal",
+                "least-energy", or a profile with its options, such as TimeOptimal(jerk_bound=True).
             duration: [s]; None is the shortest that the limits allow. A longer one slows that
-                motion down uniformly.
+                motion down uniformly. The least-energy profile needs it, and may take less.
             rate: rate of a controller [Hz]. The samples lie on its clock, and the motion from stop
                 to stop lasts a whole number of its periods. Replaces `step`.
             vehicle: "slope", a FILE.toml, or a vehicle case. Planning accounts for its slope only;

@@ -29,7 +29,7 @@ from planner.paths.legs import legs
 from planner.paths.targets import Target, resolve
 from planner.progress import Track
 from planner.reports.report import Report, TorquePeak, assumptions, torque_peaks
-from planner.timing.profile import PROFILES, TimingProfile
+from planner.timing.profile import SHORTEST, TimingProfile
 from planner.timing.time_law import Motion
 from planner.timing.timing import timed
 
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ROUNDING = 1e-9
+_EARLY = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -230,6 +231,9 @@ def plan_motion(boom: Boom, spec: MoveSpec, reference: ArrayLike | None = None) 
     total = sum(motion.duration for motion in motions)
     if spec.rate is not None and spec.duration is not None and total > spec.duration * (1.0 + _ROUNDING):
         notes = (*notes, f"duration increased from {spec.duration:g} s to {total:g} s to fit the controller's rate")
+    if spec.profile.needs_duration and spec.duration is not None and total < spec.duration * (1.0 - _EARLY):
+        early = f"the copper loss is least in {total:.4g} s; the rest of the {spec.duration:g} s would cost more in motion"
+        notes = (*notes, f"{early}: the motors hold the load all the time, and a brake can hold it at the goal")
     return PlannedMotion(motions, motions[0].path(0.0), spec.step, notes, spec.profile.limits_average_torque)
 
 
@@ -246,7 +250,7 @@ def plan_each_profile(boom: Boom, start: Target, goal: Target, track: Track = it
         InputError: as `plan`.
         InfeasibleError: as `plan`.
     """
-    specs = [MoveSpec.of(start, goal, profile=profile) for profile in PROFILES]
+    specs = [MoveSpec.of(start, goal, profile=profile) for profile in SHORTEST]
     return [replace(plan_motion(boom, spec).trajectory, planned=None) for spec in track(specs)]
 
 

@@ -14,7 +14,7 @@ from planner.reports.markdown import table
 from planner.reports.report import Report
 from planner.timing.limit_ratios import Limit
 from planner.timing.path_limits import jerk_stretch
-from planner.timing.profile import PROFILES, TimeOptimal, TimingProfile
+from planner.timing.profile import PROFILES, SHORTEST, TimeOptimal, TimingProfile
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def profile_moves(boom: Boom, spec: MoveSpec, track: Track = iter) -> tuple[dict
         InputError: as `plan`.
         InfeasibleError: as `plan`, if no profile can make the move.
     """
-    profiles: list[tuple[str, TimingProfile]] = [(str(name), kind()) for name, kind in PROFILES.items()]
+    profiles: list[tuple[str, TimingProfile]] = [(str(name), PROFILES[name]()) for name in SHORTEST]
     profiles.append(("time-optimal, jerk bound", TimeOptimal(jerk_bound=True)))
     moves: dict[str, Move] = {}
     refused: dict[str, str] = {}

@@ -26,7 +26,7 @@ from boom_model.arrays import Array
 from planner import TipTarget
 from planner.paths.legs import Along, legs
 from planner.paths.targets import Target
-from planner.timing.profile import Profile
+from planner.timing.profile import SHORTEST, Profile
 from planner.timing.time_law import Motion
 from planner.timing.timing import Timing, timed
 
@@ -34,7 +34,7 @@ BOOM = Boom.load()
 LIMITS = BOOM.limits
 SEED = 13
 CHOICES = (LeastExtension(), NearestHorizontal(), LargestMargin(), LeastTorque())
-KINDS = [*((profile, {}) for profile in Profile), (Profile.TIME_OPTIMAL, {"jerk_bound": True})]
+KINDS = [*((profile, {}) for profile in SHORTEST), (Profile.TIME_OPTIMAL, {"jerk_bound": True})]
 MOST_PAYLOAD = 45.0  # [kg]; from some 25 kg on, the drives cannot hold it everywhere
 SMALLEST = 1e-9  # share of a whole move
 

@@ -14,14 +14,14 @@ from planner.motion.trajectory import COLUMNS, TORQUES
 from planner.motion.vehicle import LEVEL, load_case
 from planner.planning import plan_move
 from planner.timing.limit_ratios import limit_ratios
-from planner.timing.profile import PROFILES, Profile, parse_profile
+from planner.timing.profile import PROFILES, SHORTEST, Profile, parse_profile
 from tests.limits import START_STOP, motor_allows, worst
 
 BOOM = Boom.load()
 HEAVY = BOOM.with_payload(18.0)
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_main_job_is_planned_and_checked(profile):
     move = plan(BOOM, "transport", "phenotyping", profile=profile)
     np.testing.assert_array_equal(move.trajectory.q[0], BOOM.pose("transport"))
@@ -32,7 +32,7 @@ def test_main_job_is_planned_and_checked(profile):
 
 
 def test_profiles_take_the_thesis_5_s_and_less():
-    durations = {p: plan(BOOM, "transport", "phenotyping", profile=p).report.duration for p in Profile}
+    durations = {p: plan(BOOM, "transport", "phenotyping", profile=p).report.duration for p in SHORTEST}
     assert durations["cubic"] == pytest.approx(5.0, rel=1e-12)
     assert durations["time-optimal"] == pytest.approx(150 / 45 + 1.0, rel=1e-6)
     assert durations["jerk-limited"] == pytest.approx(150 / 45 + 1.0 + 0.5, rel=1e-9)
@@ -63,7 +63,7 @@ def test_report_is_made_on_a_grid_ten_times_finer_than_the_samples():
 
 
 @pytest.mark.parametrize("vehicle", [LEVEL, "slope", "shock"])
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_the_report_is_that_of_the_motion_that_is_handed_over(profile, vehicle):
     """The samples alone miss peaks between them: 171.08 Nm where the motion needs 171.81 Nm."""
     move = plan(BOOM, "transport", "phenotyping", profile=profile, vehicle=vehicle)
@@ -84,7 +84,7 @@ def test_a_certificate_sees_what_a_grid_twenty_times_finer_sees():
         {"start": "transport", "goal": "phenotyping", "via": [via], "stop_at_via": False},
         {"start": line[0], "goal": line[1], "along": "line"},
     ):
-        for profile in (*PROFILES, TimeOptimal(jerk_bound=True)):
+        for profile in (*SHORTEST, TimeOptimal(jerk_bound=True)):
             move = plan(HEAVY, **spec, profile=profile, step=0.1)
             (motion,) = move.motions
             q, qd, qdd, qddd = motion(motion.times(100_000))
@@ -181,7 +181,7 @@ def test_report_as_json_has_the_documented_form():
 
 
 @pytest.mark.parametrize("rate", [3.0, 60.0, 250.0])
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_a_controllers_rate_puts_samples_and_stops_on_its_clock(profile, rate):
     via = np.array([0.7, 0.5, 2.0, 0.4, -0.2])
     move = plan(BOOM, "transport", "phenotyping", profile=profile, via=[via], rate=rate)

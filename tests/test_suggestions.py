@@ -9,7 +9,7 @@ import pytest
 from boom_model import JOINTS, Boom, InfeasibleError, forward_kinematics, inverse_dynamics
 from planner import MoveSpec, Verdict, plan
 from planner.suggestions import suggestions
-from planner.timing.profile import Profile
+from planner.timing.profile import SHORTEST
 from tests.builders import POST, ROUND_POST, with_shapes
 from tests.limits import EFFICIENCY, INERTIA, motor_allows
 
@@ -65,7 +65,7 @@ def test_payload_ratio_and_drive_that_mend_an_overload(profile):
             assert not works(changed(factor(sentence) * 0.97), profile=profile), sentence
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_duration_that_mends_haste(profile):
     least = plan(BOOM, *POSES, profile=profile).report.duration
     found = by_kind(suggestions(BOOM, MoveSpec.of(*POSES, profile=profile, duration=0.8 * least)))
@@ -116,7 +116,7 @@ def test_a_shape_in_the_way_is_not_mended_by_a_stronger_drive():
     assert suggestions(with_shapes(POST), MoveSpec.of(ROUND_POST[0], inside)) == ()
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_too_short_a_duration_names_joint_limit_place_and_ratio(profile):
     boom = BOOM.with_payload(20.0)
     with pytest.raises(InfeasibleError) as caught:

@@ -140,7 +140,7 @@ def control(
     from planner.control.shaping import Shaper
     from planner.control.study import Setup, study
     from planner.planning import plan_move
-    from planner.timing.profile import Profile
+    from planner.timing.profile import SHORTEST, Profile
 
     boom = load_boom(boom_file, payload)
     setup = Setup(
@@ -159,7 +159,7 @@ def control(
     shaping = [Shaper(name) for name in _several("shaper", shapers, list(Shaper))]
     _check_pictures(loops, errors, chosen)
     files = outputs(out, loops, errors, document=document, inputs=(boom_file, move.vehicle))
-    words = _several("profile", profiles, list(Profile))
+    words = _several("profile", profiles, list(SHORTEST if move.duration is None else Profile))
     moves = [plan_move(boom, replace(move, profile=word).spec()) for word in words]
     found = study(boom, moves, chosen, shaping, setup, tracked("simulating"))
     found = replace(found, notes=(*found.notes, *notes))

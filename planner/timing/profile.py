@@ -29,6 +29,7 @@ class Profile(StrEnum):
     TRAPEZOIDAL = "trapezoidal"
     JERK_LIMITED = "jerk-limited"
     TIME_OPTIMAL = "time-optimal"
+    LEAST_ENERGY = "least-energy"
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,8 @@ class TimingProfile(ABC):
     """
 
     name: ClassVar[Profile]
+    needs_duration: ClassVar[bool] = False
+    """Whether the profile has no shortest time of its own."""
 
     @abstractmethod
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
@@ -192,10 +195,40 @@ class TimeOptimal(TimingProfile):
         return False
 
 
+@dataclass(frozen=True)
+class LeastEnergy(TimingProfile):
+    """Motion of least loss in the motors' windings within a duration, and within the limits of joints and drives."""
+
+    name = Profile.LEAST_ENERGY
+    needs_duration = True
+    within: float | None = None
+    """Largest duration along the path [s]; `timed` fills it in from the duration of the whole move."""
+
+    def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
+        """Return the time law along a path; see `TimingProfile.law`.
+
+        Raises:
+            InputError: no duration is given, or no joint has a motor with winding data.
+        """
+        from planner.timing.profiles.least_energy import least_energy
+
+        if self.within is None:
+            raise InputError("the least-energy profile needs a duration")
+        return least_energy(boom, path, self.within, base)
+
+    @property
+    def exact_on_lines(self) -> bool:
+        """Whether the law respects every limit between its grid points on a straight joint path."""
+        return False
+
+
 PROFILES: Mapping[str, type[TimingProfile]] = MappingProxyType(
-    {kind.name: kind for kind in (Cubic, Quintic, Trapezoidal, JerkLimited, TimeOptimal)}
+    {kind.name: kind for kind in (Cubic, Quintic, Trapezoidal, JerkLimited, TimeOptimal, LeastEnergy)}
 )
 """Each profile by its word."""
+
+SHORTEST: tuple[Profile, ...] = tuple(Profile(word) for word, kind in PROFILES.items() if not kind.needs_duration)
+"""Words of the profiles that have a shortest time."""
 
 
 def parse_profile(

@@ -10,7 +10,7 @@ from boom_model.arrays import Array, scalar
 from planner.paths.clearance import require_path_clear
 from planner.paths.path import JointLine, Path, SplinePath
 from planner.timing.path_limits import least_stretch, looks, shares
-from planner.timing.profile import Cubic, Profile, TimingProfile, parse_profile
+from planner.timing.profile import Cubic, LeastEnergy, Profile, TimeOptimal, TimingProfile, parse_profile
 from planner.timing.time_law import Motion
 from planner.timing.worst_ratios import WorstRatio, joint_stretch, worst_ratios
 
@@ -59,6 +59,8 @@ class Timing:
         for name, value, unit in (("duration", duration, "s"), ("rate", rate, "Hz")):
             if value is not None and not scalar(name, value) > 0.0:
                 raise InputError(f"{name} is {value:g} {unit}; it must be above 0 {unit}")
+        if duration is None and profile.needs_duration:
+            raise InputError(f"the {profile} profile needs a duration")
         return Timing(profile, duration, rate)
 
 
@@ -73,6 +75,8 @@ def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | 
     """
     if isinstance(timing.profile, Cubic) and timing.profile.velocities is not None:
         return (_with_velocities(boom, paths, timing, timing.profile.velocities, base),)
+    if isinstance(timing.profile, LeastEnergy):
+        return _least_energy(boom, paths, timing, base)
     motions = [_least(boom, path, timing, base) for path in paths]
     least = sum(motion.duration for motion in motions)
     asked = least if timing.duration is None else timing.duration
@@ -84,6 +88,24 @@ def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | 
             raise InputError(f"rate is {timing.rate:g} Hz: one period is longer than the move, which takes {least:.4g} s")
         lengths = [np.ceil(length * timing.rate * (1.0 - _ROUNDING)) / timing.rate for length in lengths]
     return tuple(_slowed(motion, length / motion.duration) for motion, length in zip(motions, lengths, strict=True))
+
+
+def _least_energy(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | None) -> tuple[Motion, ...]:
+    """The motions of least copper loss, each within its share of the duration, as their least times share it."""
+    shortest = replace(timing, profile=TimeOptimal())
+    fastest = [_least(boom, path, shortest, base) for path in paths]
+    least, asked = sum(motion.duration for motion in fastest), timing.duration or 0.0
+    if asked < least * (1.0 - _ROUNDING):
+        raise InfeasibleError(_too_short(boom, fastest, timing, asked, least, base))
+    motions = []
+    for path, fast in zip(paths, fastest, strict=True):
+        within = replace(timing, profile=LeastEnergy(fast.duration * max(1.0, asked / least)))
+        motion = _least(boom, path, within, base)
+        length = motion.duration
+        if timing.rate is not None:
+            length = float(np.ceil(length * timing.rate * (1.0 - _ROUNDING)) / timing.rate)
+        motions.append(_slowed(motion, length / motion.duration))
+    return tuple(motions)
 
 
 def _slowed(motion: Motion, factor: float) -> Motion:

@@ -9,7 +9,7 @@ from boom_model import JOINTS, BaseMotion, Boom, Friction, up_on_slope
 from planner import TimeOptimal, Verdict, plan
 from planner.checks.certificate import certify
 from planner.paths.path import JointLine
-from planner.timing.profile import Profile
+from planner.timing.profile import SHORTEST, Profile
 from planner.timing.time_law import Motion
 from planner.timing.timing import Timing, timed
 from tests.limits import DRIVEN, EFFICIENCY, INERTIA, START_STOP, held, motor_allows, times
@@ -43,7 +43,7 @@ def recomputed(boom, motion):
     return t, found | ({"jerk": np.abs(qddd) / limits.jerk} if motion.law.jerk_limited else {})
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_ratios_are_those_of_an_independent_recomputation(profile):
     (motion,) = timed(BOOM, [JointLine(START, GOAL)], Timing.of(profile), None)
     found = certify(BOOM, [motion])
@@ -76,7 +76,7 @@ def test_times_and_joints_of_a_move_in_parts_are_counted_from_its_start():
     assert certify(BOOM, motions).iterations == sum(certify(BOOM, [motion]).iterations for motion in motions)
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_a_motion_hastened_by_two_hundredths_is_reported_broken_and_fails(profile):
     move = plan(LIGHT, START, GOAL, profile=profile)
     (motion,) = move.motions

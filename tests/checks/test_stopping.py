@@ -9,7 +9,7 @@ from boom_model import Boom, InputError, forward_kinematics
 from planner import plan
 from planner.checks.stopping import MOMENTS, Way, stop, worst_stop
 from planner.paths.path import JointLine, through
-from planner.timing.profile import Profile
+from planner.timing.profile import SHORTEST
 from planner.timing.timing import Timing, timed
 from tests.builders import motion_along, without_drives
 from tests.limits import worst
@@ -27,7 +27,7 @@ def motion_of(boom, path, profile, **options):
 
 
 @pytest.mark.parametrize("curved", [False, True], ids=["straight", "curved"])
-@pytest.mark.parametrize("profile", [*Profile, "jerk bound"])
+@pytest.mark.parametrize("profile", [*SHORTEST, "jerk bound"])
 def test_stops_begin_in_the_motions_state_keep_every_limit_and_end_at_rest(profile, curved):
     boom = BOOM.with_payload(18.0)
     path = through(boom, np.array([START, *VIA, GOAL])) if curved else JointLine(START, GOAL)

@@ -24,6 +24,7 @@ from planner.control import Case, Command, Controller, Figures, Goals, Gust, Pla
 from planner.control.closed_loop import LONGEST_STEP
 from planner.control.simulation import simulate as simulate_freely
 from planner.motion.vehicle import load_case
+from planner.timing.profile import SHORTEST
 from planner.timing.timing import Profile
 from tests.builders import main_move, plant_energy, with_running_torque
 from tests.oracles import mujoco_model, tree_matrix
@@ -36,7 +37,7 @@ STRAIGHT = impulses(Shaper.NONE, 5.0, 0.02)
 
 @pytest.fixture(scope="module")
 def moves():
-    return {profile: main_move(profile) for profile in Profile}
+    return {profile: main_move(profile) for profile in SHORTEST}
 
 
 def case(plant, controller, move, goals=None):

@@ -12,7 +12,7 @@ from planner.missions.mission import check_cycle, load_mission, named_missions, 
 from planner.motion.trajectory import concatenate
 from planner.motion.vehicle import load_case
 from planner.planning import torques
-from planner.timing.profile import Profile
+from planner.timing.profile import SHORTEST
 from planner.timing.travel_mean import average_torque
 from tests.builders import main_move, planned_mission, row, without_drives
 
@@ -52,7 +52,7 @@ def mission(tmp_path):
     return write
 
 
-@pytest.mark.parametrize("profile", list(Profile))
+@pytest.mark.parametrize("profile", list(SHORTEST))
 def test_a_mission_of_one_move_is_the_move(mission, profile):
     move = main_move(profile)
     cycle = plan_cycle(BOOM, mission(f'[[steps]]\nto = "phenotyping"\nprofile = "{profile}"\n'))

@@ -28,7 +28,7 @@ from planner.motion.trajectory import sample
 from planner.paths.tip_curves import TipArc, TipLine
 from planner.paths.tip_path import TipPath, follow
 from planner.timing.path_limits import path_dynamics
-from planner.timing.profile import Profile
+from planner.timing.profile import SHORTEST
 
 BOOM = Boom.load()
 LIMITS = BOOM.limits
@@ -264,7 +264,7 @@ ALONG = {
 }
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 @pytest.mark.parametrize("asked", ALONG.values(), ids=ALONG.keys())
 def test_a_move_of_the_tip_keeps_every_limit_and_uses_one(profile, asked):
     move = plan(BOOM, START, GOAL, profile=profile, **asked)
@@ -277,7 +277,7 @@ def test_a_move_of_the_tip_keeps_every_limit_and_uses_one(profile, asked):
     assert not [row for row in move.report.rows if row.verdict == "fail"]
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 @pytest.mark.parametrize("along", ["line", "joint"])
 def test_a_move_stops_at_every_target_on_the_way(profile, along):
     second = TipTarget((0.3, 1.5, 0.9))
@@ -295,7 +295,7 @@ def test_a_move_stops_at_every_target_on_the_way(profile, along):
     assert (np.abs(joints) <= LIMITS.velocity * SLACK * np.diff(move.trajectory.t)[:, None]).all()
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 @pytest.mark.parametrize("asked", [ALONG["arc"], ALONG["polyline"]], ids=["arc", "polyline"])
 def test_a_given_duration_is_met(profile, asked):
     least = plan(BOOM, START, GOAL, profile=profile, step=0.1, **asked).report.duration
@@ -305,7 +305,7 @@ def test_a_given_duration_is_met(profile, asked):
         plan(BOOM, START, GOAL, profile=profile, duration=0.99 * least, step=0.1, **asked)
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_the_two_metre_sweep_stays_within_a_tenth_of_a_millimetre(profile):
     move = plan(BOOM, TipTarget(tuple(SWEEP.start)), TipTarget(tuple(SWEEP.goal)), profile=profile, along="line")
     tip = forward_kinematics(BOOM, move.trajectory.q)
@@ -314,7 +314,7 @@ def test_the_two_metre_sweep_stays_within_a_tenth_of_a_millimetre(profile):
     assert any("the tip follows a line of 2 m to within" in note for note in move.report.notes)
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_an_arc_is_followed(profile):
     move = plan(BOOM, START, GOAL, profile=profile, along=(0.0, 1.6, 1.0))
     tip = forward_kinematics(BOOM, move.trajectory.q).position

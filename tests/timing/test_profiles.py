@@ -14,7 +14,7 @@ from planner import Cubic, Move, TimeOptimal, plan
 from planner.motion.trajectory import sample
 from planner.paths.path import JointLine
 from planner.timing.path_limits import InfeasiblePathError
-from planner.timing.profile import Profile
+from planner.timing.profile import SHORTEST, Profile
 from planner.timing.timing import Timing
 from tests.builders import motion_along, without_drives
 from tests.limits import random_pairs
@@ -156,7 +156,7 @@ def test_jerk_bound_keeps_the_path_the_jerk_limits_and_the_rest():
     assert sharp < motion.duration <= slow * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_random_moves_keep_every_limit(profile):
     for (start, goal), move in random_moves(profile):
         assert max(worst_ratios(move).values()) <= SLACK
@@ -199,7 +199,7 @@ def test_infeasible_load_names_joint_place_demand_and_limit():
     assert error.limit == pytest.approx((7.2 / 1.5 - 0.42) * 160 * 0.65, rel=1e-12)
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 @pytest.mark.parametrize("size", [1e-9, 1e-4])
 def test_tiny_moves(profile, size):
     start = BOOM.pose("transport")
@@ -209,7 +209,7 @@ def test_tiny_moves(profile, size):
     np.testing.assert_allclose(move.trajectory.q[-1], goal, rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_huge_limits(profile):
     """Not the limits but the drives decide."""
     wild = replace(
@@ -221,7 +221,7 @@ def test_huge_limits(profile):
     assert 0.1 < move.report.duration < 4.3
 
 
-@pytest.mark.parametrize("profile", Profile)
+@pytest.mark.parametrize("profile", SHORTEST)
 def test_given_duration_is_met_and_a_shorter_one_than_the_least_refused(profile):
     move = plan(BOOM, "transport", "phenotyping", profile=profile, duration=8.0)
     assert move.report.duration == pytest.approx(8.0, rel=1e-12)
@@ -233,8 +233,8 @@ def test_given_duration_is_met_and_a_shorter_one_than_the_least_refused(profile)
 @pytest.mark.parametrize(
     "options",
     [
-        *({"profile": profile} for profile in Profile),
-        *({"profile": profile, "via": [VIA], "stop_at_via": False} for profile in Profile),
+        *({"profile": profile} for profile in SHORTEST),
+        *({"profile": profile, "via": [VIA], "stop_at_via": False} for profile in SHORTEST),
         {"profile": Cubic.with_velocities([[0.1, 0.1, 0.2, 0.1, 0.1]]), "via": [VIA]},
         {"profile": TimeOptimal(jerk_bound=True), "rate": 100.0},
         {"profile": TimeOptimal(average_torque=True), "duration": 9.0},

@@ -7,15 +7,15 @@ import pytest
 
 from boom_model import Boom, InfeasibleError
 from planner.paths.path import JointLine
-from planner.timing.profile import Profile
+from planner.timing.profile import SHORTEST, Profile
 from planner.timing.timing import Timing
 from tests.builders import motion_along
 from tests.limits import held, random_pairs, worst
 
 BOOM = Boom.load()
 LIMITS = BOOM.limits
-KINDS = [*((profile, {}) for profile in Profile), (Profile.TIME_OPTIMAL, {"jerk_bound": True})]
-NAMES = [*Profile, "jerk bound"]
+KINDS = [*((profile, {}) for profile in SHORTEST), (Profile.TIME_OPTIMAL, {"jerk_bound": True})]
+NAMES = [*SHORTEST, "jerk bound"]
 PAIRS = {Profile.CUBIC: 1000, Profile.QUINTIC: 1000, Profile.TRAPEZOIDAL: 1000, Profile.JERK_LIMITED: 200,
          Profile.TIME_OPTIMAL: 150, "jerk bound": 30}  # fmt: skip
 SLACK = 1e-3

@@ -166,13 +166,13 @@ def _time_scale(demands: PathDynamics) -> float:
 
 def _iterate(demands: PathDynamics, path: Path, x: Array, unit: float) -> _Found | None:
     """Return the law of the last solve, the first with tangents at x (n,); None if infeasible."""
-    found, rows = None, _rows(demands, x)
+    found, rows = None, limit_rows(demands, x)
     for solves in range(1, _SOLVES + 1):
-        solved = _solve(_Condition(_breakable(rows, demands), demands.x_max, unit), path, demands.s)
+        solved = _solve(_Condition(breakable_rows(rows, demands), demands.x_max, unit), path, demands.s)
         if solved is None:
             break
         speed = solved / unit
-        old, rows = rows, _rows(demands, speed**2)
+        old, rows = rows, limit_rows(demands, speed**2)
         found = _Found(speed, solves, _gain(demands.s, speed, old, rows))
         if found.gain <= _CONVERGED:
             break
@@ -189,7 +189,7 @@ def _gain(s: Array, speed: Array, old: _Rows, new: _Rows) -> float:
     return float(np.max((b - new[1]) * x + c - new[2], where=met, initial=0.0))
 
 
-def _breakable(rows: _Rows, demands: PathDynamics) -> _Rows:
+def breakable_rows(rows: _Rows, demands: PathDynamics) -> _Rows:
     """Return the rows that some u and x within the joint limits can break; the others cost time."""
     a, b, c = rows
     x = np.minimum(demands.x_max, _FINITE)
@@ -200,7 +200,7 @@ def _breakable(rows: _Rows, demands: PathDynamics) -> _Rows:
     return a[:, kept], b[:, kept], c[:, kept]
 
 
-def _rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
+def limit_rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
     """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,)."""
     boom, zero = demands.boom, np.zeros_like(demands.s)
     at_rest, gears, inertias = motor_limits(boom, np.zeros(5)), gear_limits(boom), rotors(boom)
