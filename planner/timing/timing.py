@@ -91,7 +91,7 @@ def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | 
 
 
 def _least_energy(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | None) -> tuple[Motion, ...]:
-    """The motions of least copper loss, each within its share of the duration, as their least times share it."""
+    """Return the motions of least copper loss; their shares of the duration are those of their least times."""
     shortest = replace(timing, profile=TimeOptimal())
     fastest = [_least(boom, path, shortest, base) for path in paths]
     least, asked = sum(motion.duration for motion in fastest), timing.duration or 0.0
