@@ -24,6 +24,7 @@ COMMANDS = (
     "boom mission field-day",
     "boom mission table-2-4 table-3-1",
     "boom size field-day --joint inner --joint lower",
+    "boom require table-3-1",
     "boom control transport phenotyping",
     "boom link",
     "boom fk phenotyping",
