@@ -36,6 +36,7 @@ PAGES = {
             "boom mission field-day",
             "boom mission table-2-4 table-3-1",
             "boom size field-day",
+            "boom require field-day",
             "boom control transport phenotyping",
             "boom link",
             "boom catalogue",
