@@ -28,8 +28,9 @@ def link_cases(
     frame 7; the extension bears the tool at the wrist, and is held at its housing's mouth, `clamp` from its root.
 
     Raises:
-        InputError: there is no motion, loads are not finite, or a linkage is flat; names the instant.
+        InputError: there is no motion, loads are not finite, a linkage is flat (names the instant), or its links are unequal.
     """
+    boom.geometry.require_parallelogram("boom link")
     if not trajectories:
         raise InputError("there is no motion to take a link's loads from")
     for i, trajectory in enumerate(trajectories):
