@@ -48,6 +48,7 @@ PAGES = {
             "boom info",
             "boom new mine.toml",
             "boom compare move.csv move.csv --tolerance 0.005",
+            "boom calibrate --suggest 30 --out poses.csv",
             "boom export move.csv move.yaml",
             "boom export-model boom.urdf",
             "boom validate",

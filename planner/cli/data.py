@@ -42,6 +42,7 @@ def info(boom_file: str | None, as_json: bool) -> int:
         rows.append((joint, f"{low} to {high} {'m' if IS_LENGTH[i] else 'deg'}", speed, push, jerk, _drive(boom, i)))
     print_rows(("joint", "range", "speed/s", "acc/s2", "jerk/s3", "drive"), rows, drop=("jerk/s3",))
     print_lines(None, [f"basis of speeds, accelerations and jerks: {', '.join(_bases(boom))}"])
+    print_lines("measured", _measured(boom))
     print_lines(None, [f"lower - inner stays above {np.degrees(boom.limits.linkage):g} deg"])
     for name in sorted(boom.poses):
         tip = forward_kinematics(boom, boom.poses[name])
@@ -114,6 +115,15 @@ def new(out: str) -> int:
     return 0
 
 
+def _measured(boom: Boom) -> Iterable[str]:
+    """What a calibration has measured."""
+    g = boom.geometry
+    if boom.calibration is not None:
+        yield f"lengths and zeros of the joints: {boom.calibration.origin.source}"
+    if not g.is_parallelogram:
+        yield f"unequal links: L5 - L3 {g.upper_less_lower * 1e3:+.2f} mm, L9 - L4 {g.inner_less_outer * 1e3:+.2f} mm"
+
+
 def _limits(boom: Boom, joint: int) -> Iterable[float]:
     limits = boom.limits
     return (float(each[joint]) for each in (limits.lower, limits.upper, limits.velocity, limits.acceleration, limits.jerk))
@@ -158,6 +168,7 @@ def _info(boom: Boom) -> dict[str, Any]:
         "payload_kg": boom.payload.mass,
         "moving_mass_kg": _moving(boom),
         "linkage_rad": boom.limits.linkage,
+        "calibration": None if boom.calibration is None else _origin(boom.calibration.origin),
         "joints": [
             {
                 "joint": joint,

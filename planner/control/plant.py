@@ -91,8 +91,10 @@ class Plant:
                 (damping proportional to stiffness).
 
         Raises:
+            InputError: the linkage has unequal links.
             InfeasibleError: as `natural_frequencies`.
         """
+        boom.geometry.require_parallelogram("boom control")
         figures = Figures.of() if figures is None else figures
         joints = [i for i, drive in enumerate(boom.drives) if elastic and drive is not None and _is_elastic(drive)]
         gears = [drive.gearbox for i in joints if (drive := boom.drives[i])]

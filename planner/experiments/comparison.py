@@ -14,7 +14,7 @@ The effect on the torques follows from the derivatives of the torques by q, qd a
 them is M(q). A wider window passes less noise, but distorts the motion more.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -205,6 +205,16 @@ def evenly_sampled(log: Log, window: float) -> Log:
     return Log(t, notes=(*log.notes, note), **read)
 
 
+def _calibrated(boom: Boom, log: Log) -> Log:
+    """Return the log with joint positions in the place of readings, where the boom is calibrated."""
+    known = boom.calibration
+    if known is None:
+        return log
+    rates = {name: known.scale * values for name, values in (("qd", log.qd), ("qdd", log.qdd)) if values is not None}
+    note = f"offsets and scale of the readings are applied: {known.origin.source}"
+    return replace(log, q=read_only(known.joint_positions(log.q)), notes=(*log.notes, note), **rates)
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """A plan and a log of it at common times: the times of the log that lie within the plan."""
@@ -353,7 +363,7 @@ def compare(
     """
     if planned.t.size < 2:
         raise InputError("the plan has a single sample; it needs at least 2")
-    ready = smoothed(log, window)
+    ready = smoothed(_calibrated(boom, log), window)
     curve = _curve(planned)
     best = _best_offset(boom, planned, curve, ready.trajectory)
     offset = best if offset is None else scalar("offset", offset)

@@ -62,7 +62,7 @@ def write_model(boom: Boom, path: str | Path) -> None:
     """Write the boom as URDF (a name that ends in .urdf) or MJCF (.xml).
 
     Raises:
-        InputError: the name has another ending, the file cannot be written, or as `mjcf`.
+        InputError: the name has another ending, the file cannot be written, or as `urdf` or `mjcf`.
     """
     form = Path(path).suffix.lower()
     if form not in FORMS:
@@ -80,7 +80,11 @@ def urdf(boom: Boom) -> str:
     a transmission, so Drake and ros_control treat it as an actuator. Its ratio is 1, because
     efforts are joint torques. URDF cannot represent the coupled limit of lower - inner or the
     reflected inertia of the drives.
+
+    Raises:
+        InputError: the linkage has unequal links, which no mimic joint can represent.
     """
+    boom.geometry.require_parallelogram("a URDF")
     top = Element("robot", name=boom.name)
     for text in (
         "URDF cannot close a loop. The linkage is cut open at pin 8, between the inner and the upper link. The massless "
@@ -114,8 +118,9 @@ def mjcf(boom: Boom) -> str:
     coupled limit prevents this at lower = inner. Nothing prevents it at lower - inner = 180 deg.
 
     Raises:
-        InputError: a moving body without mass or without inertia, which MuJoCo cannot simulate.
+        InputError: the linkage has unequal links, or a moving body has no mass or no inertia, which MuJoCo cannot simulate.
     """
+    boom.geometry.require_parallelogram("an MJCF")
     for name, body in boom.bodies.items():
         if not (body.mass > 0.0 and np.linalg.eigvalsh(body.inertia)[0] > 0.0):
             raise InputError(f"{name} has no mass, or no inertia about some axis; MuJoCo needs both to be above 0")

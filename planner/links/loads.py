@@ -32,9 +32,10 @@ def link_cases(
     its root.
 
     Raises:
-        InputError: there is no motion, loads are not finite, or a linkage is flat; the message
-            names the instant.
+        InputError: there is no motion, loads are not finite, a linkage is flat (the message names
+            the instant), or its links are unequal.
     """
+    boom.geometry.require_parallelogram("boom link")
     if not trajectories:
         raise InputError("no motion is given; the loads of a link need at least one")
     for i, trajectory in enumerate(trajectories):

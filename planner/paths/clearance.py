@@ -153,6 +153,7 @@ def _reach(boom: Boom) -> Array:
     """Return a bound (5,) on how far any point of the arm moves per rad or m of each joint."""
     g, keep = boom.geometry, boom.keep_out
     assert keep is not None
+    g.require_parallelogram("the check of keep-out shapes")
     tip = g.L8 + max(keep.payload_radius, keep.link_radius)
     actuator = np.hypot(g.L7 + float(boom.limits.upper[3]), g.L6) + tip
     inner = g.L9 + keep.link_radius

@@ -32,6 +32,7 @@ COMMANDS = (
     "boom reach",
     "boom torque move.csv --out torques.csv",
     "boom compare move.csv move.csv",
+    "boom calibrate --suggest 12",
     "boom export move.csv move.yaml",
     "boom export-model boom.urdf",
     "boom validate",
