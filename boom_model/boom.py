@@ -1,7 +1,7 @@
 """The boom: geometry, bodies, joint limits, payload and drives as frozen data."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -166,23 +166,38 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Friction:
-    """Joint friction, viscous qd + coulomb sign(qd); arrays (5,), 0 where none is given."""
+    """Joint friction, viscous qd + coulomb sign(qd) + asymmetric |sign(qd)|; arrays (5,), 0 where none is given."""
 
     viscous: Array
     """[Nm s/rad, the extension's N s/m]"""
     coulomb: Array
     """[Nm, the extension's N]"""
     origins: tuple[Origin | None, ...]
-    """Of each joint's pair; None where none is given."""
+    """Of each joint's figures; None where none is given."""
+    asymmetric: Array = field(default_factory=lambda: read_only(np.zeros(5)))
+    """[Nm, the extension's N] half the difference between the dry friction forwards and backwards"""
 
     def __post_init__(self) -> None:
         VISCOUS_FRICTION.require("viscous friction", _of_shape("viscous friction", self.viscous, (5,)))
         COULOMB_FRICTION.require("coulomb friction", _of_shape("coulomb friction", self.coulomb, (5,)))
+        size = np.abs(_of_shape("asymmetric friction", self.asymmetric, (5,)))
+        if (size > self.coulomb + 1e-9).any():
+            at = int(np.argmax(size - self.coulomb))
+            raise InputError(
+                f"asymmetric friction of {JOINTS[at]} is {self.asymmetric[at]:g}; it must be within its Coulomb friction, "
+                f"{self.coulomb[at]:g}"
+            )
 
     def torque(self, qd: ArrayLike) -> Array:
         """Return the torque [Nm, the extension's N] that overcomes friction at joint velocities qd (..., 5), same shape."""
         qd = np.asarray(qd, dtype=float)
-        torque: Array = self.viscous * qd + self.coulomb * np.sign(qd)
+        torque: Array = self.viscous * qd + self.dry(np.sign(qd))
+        return torque
+
+    def dry(self, direction: ArrayLike) -> Array:
+        """Return the part that does not grow with speed, for directions -1, 0 or 1 of motion (..., 5)."""
+        direction = np.asarray(direction, dtype=float)
+        torque: Array = self.coulomb * direction + self.asymmetric * np.abs(direction)
         return torque
 
 

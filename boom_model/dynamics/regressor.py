@@ -9,12 +9,23 @@ They are the entries of its pseudo-inertia P = int (1, r) (1, r)^T dm, a symmetr
     P = [[m, m c^T], [m c, (1/2) tr(I) 1 - I]]
 
 P is positive definite exactly if some solid has these parameters (Wensing, Kim and Slotine 2018). Let z_a(q) be the places
-of the body's origin and of its axes' ends (see `newton_euler`). Virtual work gives for each joint k
+of the body's origin and of a metre along its axes (see `newton_euler`). Virtual work gives for each joint k
 
     tau_k = tr(P G_k),    G_k[a, b] = (dz_a / dq_k) . (d^2 z_b / dt^2 - gravity)
 
-The z already obey the closed linkage. This is therefore G^T Y_tree(G q, G qd, G qdd), where x = G q are the coordinates of
+The z obey the closed linkage already. This is therefore G^T Y_tree(G q, G qd, G qdd), where x = G q are the coordinates of
 the tree that a cut of the loop leaves.
+
+On a base at rest 29 combinations of the 70 parameters (the payload's belong to the end effector's) have an effect:
+
+    9  in-plane inertia and its two differences along the links at theta2, theta3 and theta3 + theta5
+    6  first moments along and across these links, which gravity shows
+    1  mass that the extension carries, and 2 first moments that it moves along theta3
+    3  products of the links at theta2 with those at theta3, through pins 6 and 8
+    1  constant inertia about the yaw axis
+    7  products with the normal of the arm's plane
+
+A base that tilts and turns shows 6 more: the yawing body's first moments across its axis, and the rest of its inertia.
 """
 
 import numpy as np
@@ -55,20 +66,16 @@ def regressor(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, base: 
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]
-    count, bodies = len(motion[0]), len(REGRESSOR_BODIES)
-    outside = base_series(base, shape)
-    elements = _elements_along_body_axes(boom)
-    Y = np.empty((count, 5, bodies, 10))
-    for start in range(0, count, _CHUNK):
+    outside, grouped = base_series(base, shape), _grouped(boom)
+    Y = np.empty((len(motion[0]), 5, grouped.shape[1]))
+    for start in range(0, len(Y), _CHUNK):
         part = slice(start, start + _CHUNK)
         state = [x[part] for x in motion]
-        A = element_accelerations(boom, *state, *(x[part] for x in outside))
-        needed = np.tensordot(elements, A, axes=(2, 1))  # (bodies, 4, 3, n)
-        needed = np.moveaxis(needed, 3, 0)[:, None]  # (n, 1, bodies, 4, 3)
-        reached = np.tensordot(elements, element_velocities(boom, state[0]), axes=(2, 2))  # (bodies, 4, 5, 3, n)
-        reached = reached.transpose(4, 2, 0, 1, 3)  # (n, 5, bodies, 4, 3)
-        Y[part] = _columns(reached @ np.swapaxes(needed, -1, -2))
-    return Y.reshape(*shape, 5, 10 * bodies)
+        A = element_accelerations(boom, *state, *(x[part] for x in outside)).transpose(2, 0, 1)  # (n, 3, 11)
+        moved = element_velocities(boom, state[0]).transpose(3, 0, 2, 1)  # (n, 5, 11, 3)
+        work = moved.reshape(len(A), 55, 3) @ A
+        Y[part] = work.reshape(len(A), 5, 121) @ grouped
+    return Y.reshape(*shape, *Y.shape[1:])
 
 
 def inertial_parameters(boom: Boom) -> Array:
@@ -119,23 +126,12 @@ def body_of_pseudo_inertia(P: Array) -> Body:
     return Body(mass, read_only(com), read_only(np.trace(spread) * np.eye(3) - spread))
 
 
-def _columns(G: Array) -> Array:
-    """tr(P G) as coefficients (..., 10) of the parameters of P."""
-    S = G + np.swapaxes(G, -1, -2)  # off the diagonal each entry of P counts twice
-    x, y, z = (0.5 * S[..., i, i] for i in (1, 2, 3))
-    half = 0.5 * (x + y + z)
-    return np.stack(
-        [
-            0.5 * S[..., 0, 0],
-            *(S[..., 0, i] for i in (1, 2, 3)),
-            *(half - x, -S[..., 1, 2], half - y, -S[..., 1, 3], -S[..., 2, 3], half - z),
-        ],
-        axis=-1,
-    )
-
-
-def _elements_along_body_axes(boom: Boom) -> Array:
-    """Origin of each body's frame, and what a metre along its own axes adds: (bodies, 4, 11)."""
-    along_link = body_elements(boom)
-    turned = [np.vstack([along_link[n][:1], R_LINK_BODY[n].T @ along_link[n][1:]]) for n in REGRESSOR_BODIES]
-    return np.stack(turned)
+def _grouped(boom: Boom) -> Array:
+    """What each parameter adds to int g g^T dm of `newton_euler`, flattened: (121, 80)."""
+    along_link, P = body_elements(boom), pseudo_inertia_of_parameters(np.eye(10))
+    columns = []
+    for name in REGRESSOR_BODIES:
+        origin, axes = along_link[name][:1], along_link[name][1:]
+        g = np.vstack([origin, R_LINK_BODY[name].T @ axes])  # the origin, and what a metre along the body's own axes adds
+        columns.append((g.T @ P @ g).reshape(10, -1).T)
+    return np.hstack(columns)

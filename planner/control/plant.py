@@ -311,7 +311,7 @@ def accelerations(
         thetadd = (u[:, E] - passed - friction(plant, theta_d, load)) / plant.rotor[E]
     if boom.friction.viscous.any() or boom.friction.coulomb.any():
         direction = np.tanh(qd / np.radians(plant.figures.stick_deg_s))
-        tau -= boom.friction.viscous * qd + boom.friction.coulomb * direction
+        tau -= boom.friction.viscous * qd + boom.friction.dry(direction)
     # One call gives the bias and the columns of M, because a call costs far more than its states.
     force = None if tip_force is None else np.broadcast_to(tip_force, (len(q), 3))[:, None]
     terms = inverse_dynamics(

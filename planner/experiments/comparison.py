@@ -139,7 +139,7 @@ def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
     window = scalar("window", window)
     if not window > 0.0:
         raise InputError(f"window is {window:g} s; it must be above 0 s")
-    log = _even(log, window)
+    log = evenly_sampled(log, window)
     n = log.t.size
     h = float(log.t[-1] - log.t[0]) / max(n - 1, 1)
     N = 2 * round(min(0.5 * window / h, n)) + 1 if h > 0.0 else 1
@@ -183,7 +183,12 @@ def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
     return Smoothed(trajectory, log.tau, noise, covariance, inside)
 
 
-def _even(log: Log, window: float) -> Log:
+def evenly_sampled(log: Log, window: float) -> Log:
+    """Return a log whose steps differ by less than 1 %, resampled by linear interpolation if they do not.
+
+    Raises:
+        InputError: a gap is longer than `window` [s].
+    """
     steps = np.diff(log.t)
     if not steps.size or np.ptp(steps) <= _EVEN * steps.mean():
         return log

@@ -125,7 +125,7 @@ def path_dynamics(boom: Boom, path: Path, s: Array, base: BaseMotion | None = No
     zero = np.zeros_like(p)
     states = [p, p, p], [zero, zero, p1], [zero, p1, p2]
     static, pushed, carried = inverse_dynamics(boom, *states, base=base, reactions=False).tau
-    coulomb, viscous = boom.friction.coulomb * np.sign(p1), boom.friction.viscous * p1
+    coulomb, viscous = boom.friction.dry(np.sign(p1)), boom.friction.viscous * p1
     cap = np.full(len(s), np.inf)
     return PathDynamics(boom, path, s, p1, p2, pushed - static, carried - static, static, coulomb, viscous, base, cap)
 
@@ -142,7 +142,7 @@ def demand_ratios(boom: Boom, path: Path, law: TimeLaw, t: Array, base: BaseMoti
     q, p1, p2 = (path(np.clip(s[:, 0], 0.0, 1.0), order) for order in range(3))
     qd, qdd = p1 * v, p1 * u + p2 * v**2
     tau = inverse_dynamics(boom, q, qd, qdd, base=base, reactions=False).tau
-    drives = _drive_ratio(boom, tau, qd, qdd, boom.friction.coulomb * np.sign(p1))
+    drives = _drive_ratio(boom, tau, qd, qdd, boom.friction.dry(np.sign(p1)))
     return (np.abs(qdd) / boom.limits.acceleration).max(axis=1), drives.max(axis=1)
 
 
@@ -161,7 +161,7 @@ def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None 
     if not limited_by_drives(boom):
         return least
     dynamic = inverse_dynamics(boom, q, qd / least, qdd / least**2, base=base, reactions=False).tau
-    rubbing = boom.friction.coulomb * np.sign(p1)
+    rubbing = boom.friction.dry(np.sign(p1))
     if (_drive_ratio(boom, dynamic, qd / least, qdd / least**2, rubbing) <= 1.0).all():
         return least
     zero = np.zeros_like(q)
@@ -200,7 +200,7 @@ class PathLoads:
         if not limited_by_drives(self.boom):
             return least
         a, b, c = np.moveaxis(self.torques(s), 1, 0)
-        rubbing = self.boom.friction.coulomb * np.sign(p1)
+        rubbing = self.boom.friction.dry(np.sign(p1))
         return _drive_stretch(self.boom, least, qd, qdd, c, a * u + b * v**2, rubbing)
 
 

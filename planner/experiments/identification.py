@@ -1,0 +1,364 @@
+"""Identification of the boom's dynamics from measured motions and torques.
+
+The torques are linear in the unknown parameters (`unknowns`). The fit is weighted least squares, and each joint's weight is
+the inverse variance of its residual, found by iteration. Residuals of neighbouring samples may be alike; the variance is
+therefore multiplied by the residual's integrated autocorrelation time, 1 for white noise.
+
+Two answers come of it. The *base parameters* are the combinations that torques can tell at all: independent columns of the
+regressor over the whole workspace, by QR with column pivoting (Gautier 1990). They are fitted to the log alone. The
+*consistent fit* gives each body figures that a solid can have (`consistency`), and stays near those of the boom's file where
+the log tells nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from boom_model import JOINTS, Boom, breakdown
+from boom_model.arrays import Array, read_only
+from boom_model.boom import LOAD_UNITS
+from boom_model.dynamics.regressor import body_of_pseudo_inertia, pseudo_inertia_of_parameters
+from planner.experiments.consistency import consistent_fit
+from planner.experiments.log_checks import delay_notes, require_plausible_torques
+from planner.experiments.readings import Readings
+from planner.experiments.unknowns import IDENTIFIED_BODIES, Unknowns
+
+HELD_OUT = 0.2
+"""Share of each log, its end, that the fit does not see."""
+
+BLOCK = 0.04
+"""Length [s] of the blocks of samples whose rows are averaged before the fit."""
+
+_ITERATIONS = 6
+_STATES = 1500
+_INDEPENDENT = 1e-8  # relative to the largest column
+_LAGS = 100
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """Combinations of parameters that the torques can tell, fitted to the log alone."""
+
+    names: tuple[str, ...]
+    """Parameter that leads each combination."""
+    combinations: Array
+    """(m, 90) K: the base parameters are K p."""
+    values: Array
+    """(m,) estimate"""
+    covariance: Array
+    """(m, m)"""
+    start: Array
+    """(m,) K p0, from the boom's file"""
+
+    @property
+    def deviations(self) -> Array:
+        """(m,) standard deviations."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """How well a model explains the torques of one joint; [Nm, the extension's N]."""
+
+    joint: str
+    unit: str
+    before: float
+    """RMS of the torques not explained by the boom's file, in what is held out"""
+    after: float
+    """the same by the identified boom"""
+    noise: float
+    """standard deviation of the torques from sample to sample"""
+    seen: float
+    """RMS of the torques not explained by the identified boom, in what the fit saw"""
+    parts: dict[str, float]
+    """RMS of each part of the identified torque over all samples, and of the residual"""
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """An identified boom, with what proves it."""
+
+    unknowns: Unknowns
+    x: Array
+    """(90,) consistent fit; see `Unknowns`"""
+    covariance: Array
+    """(90, 90) of x"""
+    base: BaseParameters | None
+    """None where the log alone does not determine them"""
+    told: int
+    """Number of combinations that the log tells better than the boom's file does"""
+    countable: int
+    """Number of combinations that any motion could tell"""
+    joints: tuple[JointFit, ...]
+    duration: float
+    """Of the logs [s]"""
+    cutoff: float
+    notes: tuple[str, ...]
+
+    @cached_property
+    def parameters(self) -> Array:
+        """p (90,) of the consistent fit."""
+        return self.unknowns.start + self.unknowns.transform @ self.x
+
+    @cached_property
+    def deviations(self) -> Array:
+        """(90,) standard deviations of p."""
+        T = self.unknowns.transform
+        return np.sqrt(np.einsum("ij,jk,ik->i", T, self.covariance, T))
+
+    @cached_property
+    def pseudo_inertias(self) -> Array:
+        """(7, 4, 4) of IDENTIFIED_BODIES."""
+        return pseudo_inertia_of_parameters(self.parameters[:70].reshape(7, 10))
+
+    @cached_property
+    def boom(self) -> Boom:
+        """The identified boom. Its file has no place for a drive inertia, so drives stay as they were."""
+        bodies = {name: body_of_pseudo_inertia(P) for name, P in zip(IDENTIFIED_BODIES, self.pseudo_inertias, strict=True)}
+        return with_dynamics(self.unknowns.boom, bodies, *self.parameters[75:].reshape(3, 5))
+
+    @property
+    def drive_inertia(self) -> Array | None:
+        """(5,) [kg m^2, the extension's kg]; None if the torques are those behind the gearboxes."""
+        return self.parameters[70:75] if self.unknowns.drive_inertia else None
+
+
+def with_dynamics(boom: Boom, bodies: dict[str, Any], viscous: Array, coulomb: Array, asymmetric: Array) -> Boom:
+    """Return the boom with other bodies and another friction."""
+    dry = np.maximum(coulomb, 0.0)  # the solver keeps its bounds to rounding
+    friction = replace(
+        boom.friction,
+        viscous=read_only(np.maximum(viscous, 0.0)),
+        coulomb=read_only(dry),
+        asymmetric=read_only(np.clip(asymmetric, -dry, dry)),
+    )
+    return replace(boom, bodies=MappingProxyType(bodies), friction=friction)
+
+
+@dataclass(frozen=True, eq=False)
+class _Data:
+    """Rows of each joint, averaged over blocks of samples, in the unknowns x."""
+
+    rows: Array
+    """(5, m, 90)"""
+    right: Array
+    """(5, m) torque that x must explain"""
+    counts: Array
+    """(5, m) samples of each block in which the joint moves"""
+
+    def residual(self, x: Array) -> Array:
+        """(5, m), times the square root of the count: of the variance of a sample."""
+        left: Array = (self.right - self.rows @ x) * np.sqrt(self.counts)
+        return left
+
+
+def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = False) -> Identification:
+    """Identify masses, centres of mass, inertias and friction.
+
+    Args:
+        boom: the boom with the payload that it carried; its figures are the starting point.
+        logs: measured motions. The last HELD_OUT of each is kept for validation.
+        drive_inertia: whether the torques accelerate the drives' own inertia too, as those computed from motor currents do.
+
+    Raises:
+        InputError: the torques have the wrong sign, unit or side of the gearbox; the message says which.
+        InfeasibleError: as `consistent_fit`.
+    """
+    seen = [log.part(slice(0, round((1.0 - HELD_OUT) * len(log.t)))) for log in logs]
+    kept = [log.part(slice(round((1.0 - HELD_OUT) * len(log.t)), None)) for log in logs]
+    require_plausible_torques(boom, seen)
+    scale = np.maximum(np.sqrt(np.mean(np.concatenate([log.tau for log in seen]) ** 2, axis=0)), 1e-3)
+    unknowns = Unknowns(boom, drive_inertia, scale)
+    data = _data(unknowns, seen)
+    K, names = _base_combinations(unknowns)
+    x, variance = np.zeros(90), np.ones(5)
+    for _ in range(_ITERATIONS):
+        H, b = _normal_equations(data, variance)
+        x = np.linalg.solve(H + np.eye(90), b)
+        variance = _variance(data, x, H, variance)
+    H, b = _normal_equations(data, variance)
+    x = consistent_fit(unknowns, H + np.eye(90), b)
+    covariance = np.linalg.inv(H + np.eye(90))
+    told = int((np.linalg.eigvalsh(H) > 1.0).sum())
+    base = _base_fit(unknowns, K, names, H, b)
+    found = Identification(
+        unknowns, x, covariance, base, told, len(K), (), sum(log.t[-1] - log.t[0] for log in logs), logs[0].cutoff, ()
+    )
+    joints = _joint_fits(found, seen, kept)
+    silent = () if told >= len(K) else (
+        f"the logs tell {told} of {len(K)} combinations better than the boom's file does; the rest stay near the file. "
+        "A longer motion of all joints tells more: boom identify --design",
+    )  # fmt: skip
+    notes = (*dict.fromkeys(note for log in logs for note in log.notes), *silent, *delay_notes(found, seen))
+    return replace(found, joints=joints, notes=notes)
+
+
+def _data(unknowns: Unknowns, logs: Sequence[Readings]) -> _Data:
+    parts = [_blocks(unknowns, log) for log in logs]
+    rows, right, counts = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
+    return _Data(rows, right, counts)
+
+
+def _blocks(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Array]:
+    length = max(1, round(BLOCK / log.step))
+    starts = np.arange(0, len(log.t), length)
+    rows, right = np.empty((5, len(starts), 90)), np.empty((5, len(starts)))
+    counts = np.add.reduceat(log.moving.astype(float), starts, axis=0).T
+    per = max(1, 2000 // length)
+    for first in range(0, len(starts), per):
+        some = starts[first : first + per]
+        part = slice(some[0], min(some[-1] + length, len(log.t)))
+        states = (log.q[part], log.qd[part], log.qdd[part])
+        used = log.moving[part]
+        Y = unknowns.rows(*states) * used[..., None]
+        tau = (log.tau[part] - unknowns.payload_torque(*states)) * used
+        cuts = some - some[0]
+        share = np.maximum(counts[:, first : first + per], 1.0)
+        mean = np.add.reduceat(Y, cuts, axis=0).transpose(1, 0, 2) / share[..., None]
+        rows[:, first : first + per] = mean @ unknowns.transform
+        right[:, first : first + per] = np.add.reduceat(tau, cuts, axis=0).T / share - mean @ unknowns.start
+    return rows, right, counts
+
+
+def _normal_equations(data: _Data, variance: Array) -> tuple[Array, Array]:
+    weighted = data.rows * (data.counts / variance[:, None])[..., None]
+    H = np.einsum("jmk,jml->kl", data.rows, weighted, optimize=True)
+    return H, np.einsum("jmk,jm->k", weighted, data.right)
+
+
+def _variance(data: _Data, x: Array, H: Array, weights: Array) -> Array:
+    """Variance (5,) of a sample, less what the fit took up, times the autocorrelation time of the residual."""
+    left, C = data.residual(x), np.linalg.inv(H + np.eye(90))
+    found = np.empty(5)
+    for j in range(5):
+        used = data.counts[j] > 0.0
+        r, rows = left[j, used], data.rows[j, used] * np.sqrt(data.counts[j, used, None])
+        taken = np.einsum("mk,kl,ml->", rows, C, rows, optimize=True) / weights[j]
+        found[j] = (r @ r) / max(len(r) - taken, 1.0) * _autocorrelation_time(r) if len(r) else 1.0
+    return np.maximum(found, 1e-12)
+
+
+def _autocorrelation_time(r: Array) -> float:
+    """1 + 2 sum of the autocorrelations up to the first that is within its own noise."""
+    energy, total = float(r @ r), 1.0
+    if energy == 0.0:
+        return total
+    for lag in range(1, min(_LAGS, len(r) // 4)):
+        rho = float(r[lag:] @ r[:-lag]) / energy
+        if rho < 2.0 / np.sqrt(len(r)):
+            break
+        total += 2.0 * rho
+    return total
+
+
+def _base_combinations(unknowns: Unknowns) -> tuple[Array, tuple[str, ...]]:
+    """K (m, 90) and the leading parameters, from the regressor over the whole workspace."""
+    K, chosen = _structure(unknowns.boom, unknowns.drive_inertia)
+    return K, tuple(unknowns.names[i] for i in chosen)
+
+
+@lru_cache(maxsize=8)
+def _structure(boom: Boom, drive_inertia: bool) -> tuple[Array, tuple[int, ...]]:
+    from scipy.linalg import qr
+
+    unknowns = Unknowns(boom, drive_inertia, np.ones(5))
+    rng, limits = np.random.default_rng(0), boom.limits
+    q = rng.uniform(limits.lower, limits.upper, (_STATES, 5))
+    q[:, 2] = rng.uniform(np.maximum(limits.lower[2], q[:, 1] + limits.linkage), limits.upper[2])
+    qd, qdd = (rng.uniform(-1.0, 1.0, (_STATES, 5)) * size for size in (limits.velocity, limits.acceleration))
+    Y = unknowns.rows(q, qd, qdd).reshape(-1, 90)
+    norms = np.linalg.norm(Y, axis=0)
+    if not drive_inertia:
+        norms[70:75] = 0.0
+    columns = np.flatnonzero(norms > _INDEPENDENT * norms.max())
+    R, order = qr(Y[:, columns] / norms[columns], mode="r", pivoting=True)
+    size = np.abs(np.diag(R))
+    m = int((size > _INDEPENDENT * size[0]).sum())
+    K = np.zeros((m, 90))
+    chosen = columns[order]
+    K[np.arange(m), chosen[:m]] = 1.0
+    weights = np.linalg.solve(R[:m, :m], R[:m, m:])
+    K[:, chosen[m:]] = weights * norms[chosen[m:]] / norms[chosen[:m], None]
+    K[np.abs(K) < 1e-9] = 0.0
+    return K, tuple(int(i) for i in chosen[:m])
+
+
+def _base_fit(unknowns: Unknowns, K: Array, names: tuple[str, ...], H: Array, b: Array) -> BaseParameters | None:
+    """Least squares of the base parameters alone; None if the log does not determine them.
+
+    The torque of any x is that of K T x, so x = (K T)^+ (b - b0) is as good as any other x with these base parameters.
+    """
+    inverse = np.linalg.pinv(K @ unknowns.transform)
+    N = inverse.T @ H @ inverse
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(N), 1e-300))
+    scaled = N * np.outer(scale, scale)
+    if not np.linalg.cond(scaled) < 1e12:
+        return None
+    covariance = np.linalg.inv(scaled) * np.outer(scale, scale)
+    start = K @ unknowns.start
+    return BaseParameters(names, K, start + covariance @ (inverse.T @ b), covariance, start)
+
+
+def _joint_fits(found: Identification, seen: Sequence[Readings], kept: Sequence[Readings]) -> tuple[JointFit, ...]:
+    unknowns, fits = found.unknowns, []
+
+    def unexplained(p: Array, logs: Sequence[Readings]) -> Array:
+        squares, count = np.zeros(5), np.zeros(5)
+        for log in logs:
+            left = (log.tau - unknowns.torque(p, log)) * log.moving
+            squares += (left**2).sum(axis=0)
+            count += log.moving.sum(axis=0)
+        return np.sqrt(squares / np.maximum(count, 1.0))
+
+    before, after = (unexplained(p, kept) for p in (unknowns.start, found.parameters))
+    inside = unexplained(found.parameters, seen)
+    noise = np.sqrt(np.mean([log.torque_noise**2 for log in seen], axis=0))
+    parts = _parts(found, [*seen, *kept])
+    for i, joint in enumerate(JOINTS):
+        each = {name: float(np.sqrt(np.mean(values[:, i] ** 2))) for name, values in parts.items()}
+        fits.append(
+            JointFit(joint, LOAD_UNITS[i], float(before[i]), float(after[i]), float(noise[i]), float(inside[i]), each)
+        )
+    return tuple(fits)
+
+
+def _parts(found: Identification, logs: Sequence[Readings]) -> dict[str, Array]:
+    boom, rotors = found.boom, found.parameters[70:75]
+    listed = []
+    for log in logs:
+        parts = breakdown(boom, log.q, log.qd, log.qdd, friction=True)
+        each = {name: getattr(parts, name) for name in ("gravity", "inertia", "velocity", "payload", "friction")}
+        each["drive inertia"] = rotors * log.qdd
+        each["residual"] = (log.tau - sum(each.values())) * log.moving
+        listed.append(each)
+    return {name: np.concatenate([each[name] for each in listed]) for name in listed[0]}
+
+
+def to_json(found: Identification, files: dict[str, str]) -> dict[str, Any]:
+    """Return the JSON object of `boom identify`, in SI."""
+    p, deviations = found.parameters, found.deviations
+    base = found.base
+    return {
+        "duration_s": found.duration,
+        "cutoff_Hz": found.cutoff,
+        "told": found.told,
+        "base_parameters": found.countable,
+        "joints": [vars(joint) for joint in found.joints],
+        "parameters": [
+            {"name": name, "value": float(p[i]), "deviation": float(deviations[i]), "start": float(found.unknowns.start[i])}
+            for i, name in enumerate(found.unknowns.names)
+            if found.unknowns.active[i]
+        ],
+        "base": None
+        if base is None
+        else [
+            {"name": name, "value": float(value), "deviation": float(sigma), "start": float(start)}
+            for name, value, sigma, start in zip(base.names, base.values, base.deviations, base.start, strict=True)
+        ],
+        "notes": list(found.notes),
+        "files": files,
+    }

@@ -1,0 +1,140 @@
+"""Logs made ready for identification: evenly sampled, low-pass filtered without delay, and differentiated.
+
+Positions pass a Butterworth filter of fourth order forwards and backwards, so that nothing is delayed. Central differences of
+the filtered positions give velocities and accelerations. Torques are not filtered: their noise averages out in the fit.
+
+A narrow filter distorts the motion. A wide one passes noise, and noise in the accelerations makes the fit underestimate
+inertias by the ratio of the variances. The filter is therefore as narrow as the log allows: it removes noise alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from boom_model import JOINTS, InputError
+from boom_model.arrays import Array, Mask
+from boom_model.boom import IS_LENGTH
+from planner.experiments.comparison import Log, evenly_sampled
+
+CUTOFFS = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
+"""Cut-off frequencies [Hz] that are tried, the narrowest first."""
+
+LONGEST_GAP = 0.1
+"""Longest gap [s] of a log that is interpolated."""
+
+_ORDER = 4
+_REMOVED = 1.2  # a filter may remove this many times the variance of the noise
+_ROUNDING = 1e-6  # [rad, m] resolution below which a position has no noise to tell
+_SLOW = 0.03  # share of its largest speed below which a joint may stick
+_SIGMAS = 4.0
+_FEWEST = 40
+_LEAST_MOTION = 1e-3  # [rad, m]
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """States and torques of a log at even steps."""
+
+    t: Array
+    q: Array
+    qd: Array
+    qdd: Array
+    tau: Array
+    """(n, 5) torques at the joints [Nm, the extension's N]"""
+    moving: Mask
+    """(n, 5) True where a joint is fast enough for its friction to have a known direction."""
+    cutoff: float
+    """Cut-off frequency of the filter [Hz]."""
+    position_noise: Array
+    """(5,) standard deviation of the noise of the positions [rad, m]"""
+    torque_noise: Array
+    """(5,) standard deviation of the noise of the torques from sample to sample [Nm, N]"""
+    notes: tuple[str, ...]
+
+    @property
+    def step(self) -> float:
+        """Time between two samples [s]."""
+        return float(self.t[-1] - self.t[0]) / (len(self.t) - 1)
+
+    def part(self, samples: slice) -> "Readings":
+        """Return some of the samples."""
+        arrays = (x[samples] for x in (self.t, self.q, self.qd, self.qdd, self.tau, self.moving))
+        return Readings(*arrays, self.cutoff, self.position_noise, self.torque_noise, self.notes)
+
+
+def readings_of(log: Log, cutoff: float | None = None) -> Readings:
+    """Return a log's states and torques, with filtered positions and their derivatives.
+
+    Args:
+        log: positions and torques. Velocities and accelerations are used as given if both are there.
+        cutoff: of the filter [Hz]. None selects the narrowest that removes noise alone.
+
+    Raises:
+        InputError: there are no torques or fewer than 40 samples, a gap is too long, a joint does not move, or the cut-off is
+            not below half the sampling rate. The message says what to measure instead.
+    """
+    if log.tau is None:
+        raise InputError("the log has no torques: measure tau1..tau5 at the joints, or motor currents current1..current5")
+    if len(log.t) < _FEWEST:
+        raise InputError(f"the log has {len(log.t)} samples; measure at least {_FEWEST}, better 20 s at 100 Hz or more")
+    steps = np.diff(log.t)
+    if steps.max() > LONGEST_GAP:
+        at = int(steps.argmax())
+        raise InputError(
+            f"the log has a gap of {steps[at]:.4g} s after t = {log.t[at]:g} s, longer than {LONGEST_GAP:g} s; "
+            "measure without gaps, or cut the log there and give both parts"
+        )
+    even = evenly_sampled(log, LONGEST_GAP)
+    tau, h = even.tau, float(even.t[-1] - even.t[0]) / (len(even.t) - 1)
+    assert tau is not None
+    _require_motion(even.q)
+    noise = np.maximum(_noise(even.q), _ROUNDING)
+    if cutoff is None:
+        usable = [f for f in CUTOFFS if f < 0.4 / h] or [0.4 / h]
+        removed = ((f, even.q - _low_pass(even.q, h, f)) for f in usable)
+        kept = (f for f, x in removed if (np.mean(x**2, axis=0) <= _REMOVED * noise**2).all())
+        cutoff = next(kept, usable[-1])
+    elif not 0.0 < cutoff < 0.5 / h:
+        raise InputError(f"cutoff is {cutoff:g} Hz; it must be between 0 and {0.5 / h:g} Hz, half the log's sampling rate")
+    q = _low_pass(even.q, h, cutoff)
+    if even.qd is not None and even.qdd is not None:
+        q, qd, qdd, edge, speed_noise = even.q, even.qd, even.qdd, 0, np.zeros(5)
+    else:
+        qd, qdd = np.gradient(q, h, axis=0), np.zeros_like(q)
+        qdd[1:-1] = np.diff(q, 2, axis=0) / h**2
+        edge = max(1, int(min(1.0 / cutoff, 0.25 * (even.t[-1] - even.t[0])) / h))
+        speed_noise = noise * 2.0 * np.pi * cutoff * np.sqrt(2.0 * cutoff * h / 3.0)
+    band = np.maximum(_SLOW * np.abs(qd).max(axis=0), _SIGMAS * speed_noise)
+    inside = slice(edge, len(q) - edge)
+    notes = (*even.notes, f"positions are low-pass filtered at {cutoff:g} Hz, forwards and backwards")
+    whole = Readings(even.t, q, qd, qdd, tau, np.abs(qd) > band, cutoff, noise, _noise(tau), notes)
+    return whole.part(inside)
+
+
+def _noise(values: Array) -> Array:
+    """Standard deviation (5,) of noise that is independent from sample to sample, by third differences.
+
+    The median of the absolute values is used: a step in the torque does not count as noise.
+    """
+    differences: Array = np.median(np.abs(np.diff(values, 3, axis=0)), axis=0) / 0.6745 / np.sqrt(20.0)
+    return differences
+
+
+def _low_pass(values: Array, step: float, cutoff: float) -> Array:
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(_ORDER, cutoff, fs=1.0 / step, output="sos")
+    padding = min(len(values) - 1, int(1.0 / (cutoff * step)))
+    passed: Array = sosfiltfilt(sections, values, axis=0, padlen=padding)
+    return passed
+
+
+def _require_motion(q: Array) -> None:
+    still = [i for i, span in enumerate(np.ptp(q, axis=0)) if span < _LEAST_MOTION]
+    if still:
+        span = {i: f"{np.ptp(q[:, i]):.2g} {'m' if IS_LENGTH[i] else 'rad'}" for i in still}
+        named = ", ".join(f"{JOINTS[i]} ({span[i]})" for i in still)
+        raise InputError(
+            f"these joints do not move: {named}; their friction and inertia stay unknown. "
+            "Measure a motion of all joints, as boom identify --design writes"
+        )
