@@ -7,21 +7,31 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from boom_model import Boom, inverse_dynamics
+from boom_model import JOINTS, Boom, inverse_dynamics
 from boom_model.arrays import Array, read_only
 from boom_model.boom import Body, Friction
-from boom_model.dynamics.regressor import body_of_pseudo_inertia, pseudo_inertia
+from boom_model.dynamics.regressor import body_parameters
 from planner.experiments.comparison import Log
+from planner.experiments.unknowns import IDENTIFIED_BODIES
 from planner.exports.robot_models import mjcf
 from tests.oracles import tree_matrix
 
 POSITION_NOISE = np.radians(0.01)
 """[rad]; the extension's is as many metres"""
 TORQUE_NOISE = 1.0
+DRIVE_INERTIA = np.array([5.0, 5.0, 5.0, 15.0, 0.1])
+"""[kg m^2, the extension's kg]"""
 STEP = 1e-3
 _SUBSTEPS = 4
 _FREQUENCY = 25.0  # [rad/s] of the controller
 _VISCOUS, _DRY = np.array([20.0, 20.0, 20.0, 50.0, 0.5]), np.array([15.0, 15.0, 15.0, 20.0, 1.0])
+
+def true_parameters(truth: Boom) -> Array:
+    """The parameters (90,) of `Unknowns` that the experiment has."""
+    bodies = [body_parameters(truth.bodies[name]) for name in IDENTIFIED_BODIES]
+    friction = truth.friction
+    return np.concatenate([*bodies, DRIVE_INERTIA, friction.viscous, friction.coulomb, friction.asymmetric])
+
 
 Motion = Callable[[Array], tuple[Array, Array, Array]]
 """t (n,) to q, qd, qdd (n, 5)."""
@@ -60,19 +70,19 @@ def experiment(nominal: Boom, truth: Boom, motion: Motion, duration: float, rng:
     """
     model = mujoco.MjModel.from_xml_string(mjcf(truth))
     model.opt.timestep = h = STEP / _SUBSTEPS
+    model.dof_armature[[model.joint(name).dofadr[0] for name in JOINTS]] = DRIVE_INERTIA
     model.dof_solref[:], model.dof_solimp[:] = (2.0 * h, 1.0), (0.99, 0.99, 0.001, 0.5, 2.0)  # dry friction is stiff
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
     model.jnt_limited[:] = 0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     data = mujoco.MjData(model)
-    names = ("yaw", "inner", "lower", "extension", "wrist")
-    at = np.array([model.joint(name).qposadr[0] for name in names])
-    dof = np.array([model.joint(name).dofadr[0] for name in names])
+    at = np.array([model.joint(name).qposadr[0] for name in JOINTS])
+    dof = np.array([model.joint(name).dofadr[0] for name in JOINTS])
     count = round(duration / STEP)
     t = np.arange(count) * STEP
     wanted = motion(np.arange(count * _SUBSTEPS) * h)
     feed = inverse_dynamics(nominal, *wanted, reactions=False).tau
-    M = np.array([60.0, 40.0, 15.0, 3.0, 0.02])
+    M = np.array([60.0, 40.0, 15.0, 20.0, 0.1])
     kp, kd = M * _FREQUENCY**2, 2.0 * M * _FREQUENCY
     G = tree_matrix(nominal)
     data.qpos[:], data.qvel[:] = G @ wanted[0][0], G @ wanted[1][0]

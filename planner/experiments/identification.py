@@ -1,7 +1,8 @@
 """Identification of the boom's dynamics from measured motions and torques.
 
 The torques are linear in the unknown parameters (`unknowns`). The fit is weighted least squares, and each joint's weight is
-the inverse variance of its residual, found by iteration. Residuals of neighbouring samples may be alike; the variance is
+the inverse variance of its residual, found by iteration. The noise of the accelerations is in the regressor: what it adds to the
+normal equations on average is subtracted, or inertias would come out too small. Residuals of neighbouring samples may be alike; the variance is
 therefore multiplied by the residual's integrated autocorrelation time, 1 for white noise.
 
 Two answers come of it. The *base parameters* are the combinations that torques can tell at all: independent columns of the
@@ -149,6 +150,8 @@ class _Data:
     """(5, m) torque that x must explain"""
     counts: Array
     """(5, m) samples of each block in which the joint moves"""
+    noise: Array
+    """(5, 90, 90) what the noise of the accelerations adds to the sum of squared rows"""
 
     def residual(self, x: Array) -> Array:
         """(5, m), times the square root of the count: of the variance of a sample."""
@@ -200,7 +203,8 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
 def _data(unknowns: Unknowns, logs: Sequence[Readings]) -> _Data:
     parts = [_blocks(unknowns, log) for log in logs]
     rows, right, counts = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
-    return _Data(rows, right, counts)
+    noise = sum((_noise_of_rows(unknowns, log, part[2]) for log, part in zip(logs, parts, strict=True)), np.zeros((5, 90, 90)))
+    return _Data(rows, right, counts, noise)
 
 
 def _blocks(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Array]:
@@ -224,9 +228,29 @@ def _blocks(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Array]:
     return rows, right, counts
 
 
+def _noise_of_rows(unknowns: Unknowns, log: Readings, counts: Array) -> Array:
+    """(5, 90, 90) the expected sum of c dY^T dY of each joint, dY the error of its rows by noise in the accelerations.
+
+    Rows are linear in qdd: dY = sum over joints k of dqdd_k dY/dqdd_k.
+    """
+    variance = log.acceleration_variance(BLOCK)
+    some = slice(max(1, round(BLOCK / log.step)) // 2, None, max(1, round(BLOCK / log.step)))
+    q, zero = log.q[some], np.zeros_like(log.q[some])
+    counts = counts[:, : len(q)]
+    still = unknowns.rows(q, zero, zero)
+    found = np.zeros((5, 90, 90))
+    for k in range(5):
+        slope = (unknowns.rows(q, zero, zero + np.eye(5)[k]) - still) @ unknowns.transform
+        weighted = slope * (variance[k] * counts.T)[..., None]
+        found += np.einsum("njk,njl->jkl", slope, weighted, optimize=True)
+    return found
+
+
 def _normal_equations(data: _Data, variance: Array) -> tuple[Array, Array]:
     weighted = data.rows * (data.counts / variance[:, None])[..., None]
-    H = np.einsum("jmk,jml->kl", data.rows, weighted, optimize=True)
+    H = np.einsum("jmk,jml->kl", data.rows, weighted, optimize=True) - np.tensordot(1.0 / variance, data.noise, axes=1)
+    values, vectors = np.linalg.eigh(H)
+    H = (vectors * np.maximum(values, 0.0)) @ vectors.T  # where the log holds noise alone it tells nothing
     return H, np.einsum("jmk,jm->k", weighted, data.right)
 
 

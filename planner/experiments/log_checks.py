@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from boom_model import JOINTS, Boom, InputError, inverse_dynamics
-from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from planner.experiments.readings import Readings
 
@@ -14,6 +13,7 @@ if TYPE_CHECKING:
     from planner.experiments.identification import Identification
 
 _SAMPLES = 4000
+_EXPLAINED = 0.5  # share of the torque beside friction that the boom's file must explain, to judge by
 _SURE = 5.0  # standard deviations
 _ALIKE = 2.5  # factor between a log and the boom's file that different masses may cause
 _NEAR = 2.0  # factor within which a gain is taken for that of another unit
@@ -23,16 +23,16 @@ _NOTICED = 2e-3  # [s]
 def require_plausible_torques(boom: Boom, logs: Sequence[Readings]) -> None:
     """Refuse torques that are not those of this boom's joints in Nm and N.
 
-    Each joint's torques are fitted by gain tau_file + viscous qd + coulomb sign(qd) + constant, with the torques tau_file of
-    the boom's file. A gain far from 1 that the log tells for sure is a slip.
+    Each joint's torques are fitted by gain tau_file + inertia qdd + viscous qd + coulomb sign(qd) + constant, with the torques
+    tau_file of the boom's file. Where tau_file explains most of what the rest leaves, a gain far from 1 is a slip.
 
     Raises:
         InputError: a gain is negative or a power of ten or a gear ratio away from 1. The message says what it looks like.
     """
     for i, joint in enumerate(JOINTS):
-        gain, sigma = _gain(boom, logs, i)
-        if abs(gain) < _SURE * sigma:
-            continue
+        gain, explained = _gain(boom, logs, i)
+        if explained < _EXPLAINED:
+            continue  # friction and noise hide what the masses do
         unit = "N" if IS_LENGTH[i] else "Nm"
         if gain < 0.0:
             _refuse(i, gain, f"look turned round: they must be positive along the joint's coordinate (multiply tau{i + 1} by -1)")
@@ -57,30 +57,24 @@ def _refuse(i: int, gain: float, meant: str) -> None:
 
 
 def _gain(boom: Boom, logs: Sequence[Readings], joint: int) -> tuple[float, float]:
-    """The gain of a joint and its standard deviation."""
+    """The gain of a joint, and the share of the torque beside friction and drive inertia that it explains."""
     columns, right = [], []
     for log in logs:
         some = slice(None, None, max(1, len(log.t) * len(logs) // _SAMPLES))
         states = (log.q[some], log.qd[some], log.qdd[some])
-        qd, used = states[1][:, joint], log.moving[some, joint]
+        qd, qdd, used = states[1][:, joint], states[2][:, joint], log.moving[some, joint]
         model = inverse_dynamics(boom, *states, reactions=False).tau[:, joint]
-        columns.append(np.stack([model, qd, np.sign(qd), np.ones(len(qd))], axis=-1)[used])
+        columns.append(np.stack([model, qdd, qd, np.sign(qd), np.ones(len(qd))], axis=-1)[used])
         right.append(log.tau[some, joint][used])
-    return _first_coefficient(np.concatenate(columns), np.concatenate(right))
-
-
-def _first_coefficient(A: Array, b: Array) -> tuple[float, float]:
-    """The first coefficient of a least squares fit and its standard deviation."""
-    norms = np.linalg.norm(A, axis=0)
-    if len(b) <= A.shape[1] or not (norms > 0.0).all():
-        return 0.0, np.inf
-    scaled = A / norms
-    x, _, rank, _ = np.linalg.lstsq(scaled, b, rcond=1e-6)
-    if rank < A.shape[1]:
-        return 0.0, np.inf
-    variance = float(np.sum((b - scaled @ x) ** 2)) / (len(b) - A.shape[1])
-    sigma = np.sqrt(variance * np.linalg.inv(scaled.T @ scaled)[0, 0])
-    return float(x[0] / norms[0]), float(sigma / norms[0])
+    A, b = np.concatenate(columns), np.concatenate(right)
+    if len(b) <= 2 * A.shape[1]:
+        return 1.0, 0.0
+    model, tau = (x - A[:, 1:] @ np.linalg.lstsq(A[:, 1:], x, rcond=None)[0] for x in (A[:, 0], b))
+    energy = float(model @ model)
+    if energy <= 1e-12 * float(A[:, 0] @ A[:, 0]) or not tau.any():
+        return 1.0, 0.0
+    gain = float(model @ tau) / energy
+    return gain, gain**2 * energy / float(tau @ tau)
 
 
 def delay_notes(found: "Identification", logs: Sequence[Readings]) -> tuple[str, ...]:

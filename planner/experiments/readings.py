@@ -4,7 +4,8 @@ Positions pass a Butterworth filter of fourth order forwards and backwards, so t
 the filtered positions give velocities and accelerations. Torques are not filtered: their noise averages out in the fit.
 
 A narrow filter distorts the motion. A wide one passes noise, and noise in the accelerations makes the fit underestimate
-inertias by the ratio of the variances. The filter is therefore as narrow as the log allows: it removes noise alone.
+inertias by the ratio of the variances. The filter is therefore as narrow as the log allows: it removes noise alone. What
+noise it passes is known, and the fit takes it into account.
 """
 
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ _REMOVED = 1.2  # a filter may remove this many times the variance of the noise
 _ROUNDING = 1e-6  # [rad, m] resolution below which a position has no noise to tell
 _SLOW = 0.03  # share of its largest speed below which a joint may stick
 _SIGMAS = 4.0
+_SMEARED = 0.6  # share of 1 / cutoff over which the filter smears a change of direction
 _FEWEST = 40
 _LEAST_MOTION = 1e-3  # [rad, m]
 
@@ -49,6 +51,8 @@ class Readings:
     """(5,) standard deviation of the noise of the positions [rad, m]"""
     torque_noise: Array
     """(5,) standard deviation of the noise of the torques from sample to sample [Nm, N]"""
+    filtered: bool
+    """Whether the accelerations come from the filtered positions; otherwise the log has them."""
     notes: tuple[str, ...]
 
     @property
@@ -56,10 +60,24 @@ class Readings:
         """Time between two samples [s]."""
         return float(self.t[-1] - self.t[0]) / (len(self.t) - 1)
 
+    def acceleration_variance(self, block: float) -> Array:
+        """Variance (5,) of the noise of accelerations, averaged over blocks of `block` seconds.
+
+        White noise of variance v per sample of step h, through the filter's gain 1 / (1 + (f / fc)^8), two differentiations
+        and the mean over T:
+
+            2 h v integral of (2 pi f)^4 (sin(pi f T) / (pi f T))^2 / (1 + (f / fc)^8)^2 df
+        """
+        if not self.filtered:
+            return np.zeros(5)
+        f = np.linspace(0.0, min(3.0 * self.cutoff, 0.5 / self.step), 600)
+        gain = (2.0 * np.pi * f) ** 4 * np.sinc(f * block) ** 2 / (1.0 + (f / self.cutoff) ** (2 * _ORDER)) ** 2
+        return np.asarray(2.0 * self.step * self.position_noise**2 * np.trapezoid(gain, f))
+
     def part(self, samples: slice) -> "Readings":
         """Return some of the samples."""
         arrays = (x[samples] for x in (self.t, self.q, self.qd, self.qdd, self.tau, self.moving))
-        return Readings(*arrays, self.cutoff, self.position_noise, self.torque_noise, self.notes)
+        return Readings(*arrays, self.cutoff, self.position_noise, self.torque_noise, self.filtered, self.notes)
 
 
 def readings_of(log: Log, cutoff: float | None = None) -> Readings:
@@ -89,26 +107,37 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     assert tau is not None
     _require_motion(even.q)
     noise = np.maximum(_noise(even.q), _ROUNDING)
-    if cutoff is None:
-        usable = [f for f in CUTOFFS if f < 0.4 / h] or [0.4 / h]
-        removed = ((f, even.q - _low_pass(even.q, h, f)) for f in usable)
-        kept = (f for f, x in removed if (np.mean(x**2, axis=0) <= _REMOVED * noise**2).all())
-        cutoff = next(kept, usable[-1])
-    elif not 0.0 < cutoff < 0.5 / h:
+    if cutoff is not None and not 0.0 < cutoff < 0.5 / h:
         raise InputError(f"cutoff is {cutoff:g} Hz; it must be between 0 and {0.5 / h:g} Hz, half the log's sampling rate")
-    q = _low_pass(even.q, h, cutoff)
+    usable = [cutoff] if cutoff is not None else [f for f in CUTOFFS if f < 0.4 / h] or [0.4 / h]
+    for cutoff in usable:  # noqa: B020, the last one tried is used
+        q = _low_pass(even.q, h, cutoff)
+        moving = _moving(np.gradient(q, h, axis=0), noise, h, cutoff)
+        removed = np.sum((even.q - q) ** 2 * moving, axis=0)
+        if (removed <= _REMOVED * noise**2 * moving.sum(axis=0)).all():
+            break
+    filtered = even.qd is None or even.qdd is None
     if even.qd is not None and even.qdd is not None:
-        q, qd, qdd, edge, speed_noise = even.q, even.qd, even.qdd, 0, np.zeros(5)
+        q, qd, qdd, edge = even.q, even.qd, even.qdd, 0
     else:
         qd, qdd = np.gradient(q, h, axis=0), np.zeros_like(q)
         qdd[1:-1] = np.diff(q, 2, axis=0) / h**2
         edge = max(1, int(min(1.0 / cutoff, 0.25 * (even.t[-1] - even.t[0])) / h))
-        speed_noise = noise * 2.0 * np.pi * cutoff * np.sqrt(2.0 * cutoff * h / 3.0)
-    band = np.maximum(_SLOW * np.abs(qd).max(axis=0), _SIGMAS * speed_noise)
     inside = slice(edge, len(q) - edge)
     notes = (*even.notes, f"positions are low-pass filtered at {cutoff:g} Hz, forwards and backwards")
-    whole = Readings(even.t, q, qd, qdd, tau, np.abs(qd) > band, cutoff, noise, _noise(tau), notes)
+    whole = Readings(even.t, q, qd, qdd, tau, moving, cutoff, noise, _noise(tau), filtered, notes)
     return whole.part(inside)
+
+
+def _moving(qd: Array, noise: Array, step: float, cutoff: float) -> Mask:
+    """(n, 5) where a joint moves, but for the time over which the filter smears a change of direction."""
+    from scipy.ndimage import binary_erosion
+
+    speed_noise = noise * 2.0 * np.pi * cutoff * np.sqrt(2.0 * cutoff * step / 3.0)
+    fast = np.abs(qd) > np.maximum(_SLOW * np.abs(qd).max(axis=0), _SIGMAS * speed_noise)
+    reach = int(_SMEARED / (cutoff * step))
+    kept: Mask = binary_erosion(fast, np.ones((2 * reach + 1, 1), dtype=bool), border_value=1)
+    return kept
 
 
 def _noise(values: Array) -> Array:
