@@ -91,6 +91,8 @@ class Body:
     """(3,) centre of mass in the body's frame [m]."""
     inertia: Array
     """(3, 3) about the centre of mass, along the axes of the body's frame [kg m^2]."""
+    origin: Origin | None = None
+    """Of these figures; None where the boom's file does not say."""
 
     def __post_init__(self) -> None:
         MASS.require("a body's mass", scalar("a body's mass", self.mass))

@@ -54,6 +54,7 @@ _Place = Annotated[list[Annotated[float, POSITION]], Field(min_length=3, max_len
 _Gap = Annotated[float, CLEARANCE]
 _Viscous = Annotated[float, VISCOUS_FRICTION]
 _Coulomb = Annotated[float, COULOMB_FRICTION]
+_Asymmetric = Annotated[float, Field(ge=-COULOMB_FRICTION.high, le=COULOMB_FRICTION.high, allow_inf_nan=False)]
 
 
 def inertia_tensor(value: Any) -> Array:
@@ -134,6 +135,18 @@ class _BodyTable(Table):
     mass_kg: _Mass
     com_m: Triple
     inertia_kg_m2: Annotated[Any, AfterValidator(inertia_tensor)]
+    basis: BasisName | None = None
+    source: str | None = None
+
+    @model_validator(mode="after")
+    def _both(self) -> "_BodyTable":
+        if (self.basis is None) != (self.source is None):
+            raise ValueError("basis and source belong together")
+        return self
+
+    @property
+    def origin(self) -> Origin | None:
+        return None if self.basis is None or self.source is None else Origin(Basis(self.basis), self.source)
 
 
 class _DriveTable(Table):
@@ -152,20 +165,22 @@ class _ActuatorTable(Table):
 class _RevoluteFriction(_Origin):
     viscous_Nm_s_per_rad: _Viscous
     coulomb_Nm: _Coulomb
+    asymmetric_Nm: _Asymmetric = 0.0
 
     @property
-    def pair(self) -> tuple[float, float]:
-        """Viscous and Coulomb."""
-        return self.viscous_Nm_s_per_rad, self.coulomb_Nm
+    def figures(self) -> tuple[float, float, float]:
+        """Viscous, Coulomb and asymmetric."""
+        return self.viscous_Nm_s_per_rad, self.coulomb_Nm, self.asymmetric_Nm
 
 
 class _PrismaticFriction(_Origin):
     viscous_N_s_per_m: _Viscous
     coulomb_N: _Coulomb
+    asymmetric_N: _Asymmetric = 0.0
 
     @property
-    def pair(self) -> tuple[float, float]:
-        return self.viscous_N_s_per_m, self.coulomb_N
+    def figures(self) -> tuple[float, float, float]:
+        return self.viscous_N_s_per_m, self.coulomb_N, self.asymmetric_N
 
 
 class _RevoluteTable(Table):
@@ -314,7 +329,7 @@ def read_boom(path: str | Path | None, catalogue: str | Path | None) -> Boom:
 
 
 def _body(table: _BodyTable | _PayloadTable) -> Body:
-    return Body(table.mass_kg, read_only(table.com_m), table.inertia_kg_m2)
+    return Body(table.mass_kg, read_only(table.com_m), table.inertia_kg_m2, table.origin)
 
 
 def _keep_out(table: _KeepOutTable) -> KeepOut:
@@ -329,9 +344,9 @@ def _given(table: "_Sourced[V] | None") -> Sourced[V] | None:
 
 def _friction(joints: list[Any]) -> Friction:
     tables = [joint.friction for joint in joints]
-    viscous, coulomb = zip(*((0.0, 0.0) if t is None else t.pair for t in tables), strict=True)
+    viscous, coulomb, asymmetric = zip(*((0.0, 0.0, 0.0) if t is None else t.figures for t in tables), strict=True)
     origins = tuple(None if t is None else t.origin for t in tables)
-    return Friction(read_only(viscous), read_only(coulomb), origins)
+    return Friction(read_only(viscous), read_only(coulomb), origins, read_only(asymmetric))
 
 
 def _limits(joints: list[Any], linkage: _LinkageTable) -> Limits:

@@ -9,7 +9,7 @@ from itertools import takewhile
 import click
 
 from boom_model import InputError
-from planner.cli import control, data, drives, files, kinematics, link, moves, view
+from planner.cli import control, data, drives, files, identify, kinematics, link, moves, view
 from planner.cli.failures import failure
 from planner.cli.printing import quieten
 
@@ -90,6 +90,7 @@ for _command in (
     files.export,
     files.export_model,
     files.compare,
+    identify.identify,
     files.validate,
     view.view,
     data.info,

@@ -22,7 +22,7 @@ import numpy as np
 from boom_model import JOINTS, Boom, breakdown
 from boom_model.arrays import Array, read_only
 from boom_model.boom import LOAD_UNITS
-from boom_model.dynamics.regressor import body_of_pseudo_inertia, pseudo_inertia_of_parameters
+from boom_model.dynamics.regressor import body_of_pseudo_inertia, body_parameters, pseudo_inertia_of_parameters
 from planner.experiments.consistency import consistent_fit
 from planner.experiments.log_checks import delay_notes, require_plausible_torques
 from planner.experiments.readings import Readings
@@ -212,14 +212,14 @@ def _blocks(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Array]:
     starts = np.arange(0, len(log.t), length)
     rows, right = np.empty((5, len(starts), 90)), np.empty((5, len(starts)))
     counts = np.add.reduceat(log.moving.astype(float), starts, axis=0).T
-    per = max(1, 2000 // length)
+    per, payload = max(1, 2000 // length), body_parameters(unknowns.boom.payload)
     for first in range(0, len(starts), per):
         some = starts[first : first + per]
         part = slice(some[0], min(some[-1] + length, len(log.t)))
         states = (log.q[part], log.qd[part], log.qdd[part])
         used = log.moving[part]
         Y = unknowns.rows(*states) * used[..., None]
-        tau = (log.tau[part] - unknowns.payload_torque(*states)) * used
+        tau = (log.tau[part] - unknowns.payload_rows(*states) @ payload) * used
         cuts = some - some[0]
         share = np.maximum(counts[:, first : first + per], 1.0)
         mean = np.add.reduceat(Y, cuts, axis=0).transpose(1, 0, 2) / share[..., None]
@@ -262,12 +262,12 @@ def _variance(data: _Data, x: Array, H: Array, weights: Array) -> Array:
         used = data.counts[j] > 0.0
         r, rows = left[j, used], data.rows[j, used] * np.sqrt(data.counts[j, used, None])
         taken = np.einsum("mk,kl,ml->", rows, C, rows, optimize=True) / weights[j]
-        found[j] = (r @ r) / max(len(r) - taken, 1.0) * _autocorrelation_time(r) if len(r) else 1.0
+        found[j] = (r @ r) / max(len(r) - taken, 1.0) * autocorrelation_time(r) if len(r) else 1.0
     return np.maximum(found, 1e-12)
 
 
-def _autocorrelation_time(r: Array) -> float:
-    """1 + 2 sum of the autocorrelations up to the first that is within its own noise."""
+def autocorrelation_time(r: Array) -> float:
+    """Return 1 + 2 sum of the autocorrelations of r (n,), up to the first that is within its own noise."""
     energy, total = float(r @ r), 1.0
     if energy == 0.0:
         return total
@@ -279,14 +279,23 @@ def _autocorrelation_time(r: Array) -> float:
     return total
 
 
+def base_columns(boom: Boom) -> tuple[Array, Array]:
+    """Return the columns (m,) of the regressor that base parameters lead, and their RMS (m,) over the whole workspace.
+
+    The torques are those behind the gearboxes.
+    """
+    _, chosen, sizes = _structure(boom, False)
+    return np.array(chosen), sizes
+
+
 def _base_combinations(unknowns: Unknowns) -> tuple[Array, tuple[str, ...]]:
     """K (m, 90) and the leading parameters, from the regressor over the whole workspace."""
-    K, chosen = _structure(unknowns.boom, unknowns.drive_inertia)
+    K, chosen, _ = _structure(unknowns.boom, unknowns.drive_inertia)
     return K, tuple(unknowns.names[i] for i in chosen)
 
 
 @lru_cache(maxsize=8)
-def _structure(boom: Boom, drive_inertia: bool) -> tuple[Array, tuple[int, ...]]:
+def _structure(boom: Boom, drive_inertia: bool) -> tuple[Array, tuple[int, ...], Array]:
     from scipy.linalg import qr
 
     unknowns = Unknowns(boom, drive_inertia, np.ones(5))
@@ -308,7 +317,7 @@ def _structure(boom: Boom, drive_inertia: bool) -> tuple[Array, tuple[int, ...]]
     weights = np.linalg.solve(R[:m, :m], R[:m, m:])
     K[:, chosen[m:]] = weights * norms[chosen[m:]] / norms[chosen[:m], None]
     K[np.abs(K) < 1e-9] = 0.0
-    return K, tuple(int(i) for i in chosen[:m])
+    return K, tuple(int(i) for i in chosen[:m]), norms[chosen[:m]] / np.sqrt(_STATES)
 
 
 def _base_fit(unknowns: Unknowns, K: Array, names: tuple[str, ...], H: Array, b: Array) -> BaseParameters | None:

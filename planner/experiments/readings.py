@@ -8,14 +8,16 @@ inertias by the ratio of the variances. The filter is therefore as narrow as the
 noise it passes is known, and the fit takes it into account.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from boom_model import JOINTS, InputError
-from boom_model.arrays import Array, Mask
+from boom_model.arrays import Array, Mask, checked, read_only
 from boom_model.boom import IS_LENGTH
-from planner.experiments.comparison import Log, evenly_sampled
+from planner.experiments.comparison import Log, evenly_sampled, read_log
 
 CUTOFFS = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 """Cut-off frequencies [Hz] that are tried, the narrowest first."""
@@ -80,6 +82,25 @@ class Readings:
         return Readings(*arrays, self.cutoff, self.position_noise, self.torque_noise, self.filtered, self.notes)
 
 
+def read_torque_log(path: str | Path, torque_per_ampere: ArrayLike | None = None) -> Log:
+    """Read a log with torques or motor currents from CSV or Parquet: t, q1..q5, tau1..tau5, any of qd1..qd5 and qdd1..qdd5.
+
+    Args:
+        path: the file.
+        torque_per_ampere: (5,) motor constant times gear ratio [Nm/A, the extension's N/A]; tau1..tau5 are then currents [A].
+            None takes them as torques at the joints.
+
+    Raises:
+        InputError: as `read_log`, or there are no torques.
+    """
+    log = read_log(path)
+    if log.tau is None:
+        raise InputError(f"{path}: the log has no torques: measure tau1..tau5, at the joints or as motor currents")
+    if torque_per_ampere is None:
+        return log
+    return replace(log, tau=read_only(log.tau * checked("torque per ampere", torque_per_ampere, 5)))
+
+
 def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     """Return a log's states and torques, with filtered positions and their derivatives.
 
@@ -92,7 +113,7 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
             not below half the sampling rate. The message says what to measure instead.
     """
     if log.tau is None:
-        raise InputError("the log has no torques: measure tau1..tau5 at the joints, or motor currents current1..current5")
+        raise InputError("the log has no torques: measure tau1..tau5, at the joints or as motor currents")
     if len(log.t) < _FEWEST:
         raise InputError(f"the log has {len(log.t)} samples; measure at least {_FEWEST}, better 20 s at 100 Hz or more")
     steps = np.diff(log.t)

@@ -71,7 +71,7 @@ class Unknowns:
                 rotors if self.drive_inertia else np.zeros(5),
                 friction.viscous,
                 friction.coulomb,
-                np.zeros(5),
+                friction.asymmetric,
             ]
         )
 
@@ -99,14 +99,14 @@ class Unknowns:
         T[75:, 75:] = np.diag(np.concatenate([self.torque_scale / speed, self.torque_scale, self.torque_scale]))
         return T
 
-    def rows(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return the derivative of tau by p at states (n, 5), as (n, 5, 90)."""
+    def rows(self, q: Array, qd: Array, qdd: Array, direction: Array | None = None) -> Array:
+        """Return the derivative of tau by p at states (n, 5), as (n, 5, 90); `direction` replaces sign(qd)."""
         rows = np.zeros((len(q), 5, 90))
         rows[..., :70] = regressor(self.boom, q, qd, qdd)[..., :70]
         joint = np.arange(5)
         rows[:, joint, 70 + joint] = qdd
         rows[:, joint, 75 + joint] = qd
-        rows[:, joint, 80 + joint] = np.sign(qd)
+        rows[:, joint, 80 + joint] = np.sign(qd) if direction is None else direction
         rows[:, joint, 85 + joint] = 1.0
         return rows
 
@@ -119,9 +119,9 @@ class Unknowns:
         viscous, coulomb, asymmetric = p[75:].reshape(3, 5)
         return tau + p[70:75] * readings.qdd + viscous * readings.qd + coulomb * direction + asymmetric
 
-    def payload_torque(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return the torque (n, 5) of the known payload."""
-        return np.asarray(regressor(self.boom, q, qd, qdd)[..., 70:] @ body_parameters(self.boom.payload))
+    def payload_rows(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Return the derivative of tau by the payload's ten parameters at states (n, 5), as (n, 5, 10)."""
+        return regressor(self.boom, q, qd, qdd)[..., 70:]
 
     @cached_property
     def active(self) -> Mask:

@@ -1,0 +1,105 @@
+"""The file of an identified boom: measured bodies and friction, everything else as it was."""
+
+from pathlib import Path
+
+import numpy as np
+
+from boom_model import JOINTS, Body, Boom, InputError
+from boom_model.arrays import Array
+from boom_model.boom import IS_LENGTH
+from boom_model.boom_file import BOOM_FILE
+from planner.experiments.identification import Identification
+from planner.experiments.unknowns import IDENTIFIED_BODIES
+from planner.files import replacing
+
+_INERTIA = "inertia_kg_m2"
+
+
+def write_identified(path: str | Path, source: str | Path | None, found: Identification, logs: str) -> None:
+    """Write a boom's TOML file with the identified bodies and friction, basis measured; comments stay.
+
+    Args:
+        path: the file to write.
+        source: the boom's file; None is the shipped one.
+        found: what was identified.
+        logs: names of the logs, for the source of each figure.
+
+    Raises:
+        InputError: a file cannot be read or written; an old one is left as it was.
+    """
+    deviations = found.deviations
+    bodies = {}
+    for k, name in enumerate(IDENTIFIED_BODIES):
+        mass = deviations[10 * k]
+        bodies[name] = f"boom identify {logs}: mass to {mass:.2g} kg; torques tell combinations, the split is nearest to the CAD"
+    friction = {
+        joint: f"boom identify {logs}: viscous to {deviations[75 + i]:.2g}, coulomb to {deviations[80 + i]:.2g}, "
+        f"asymmetric to {deviations[85 + i]:.2g}"
+        for i, joint in enumerate(JOINTS)
+    }
+    _write(path, source, found.boom, bodies, friction, None)
+
+
+def write_payload(path: str | Path, source: str | Path | None, boom: Boom, why: str) -> None:
+    """Write a boom's TOML file with another payload, basis measured.
+
+    Raises:
+        InputError: as `write_identified`.
+    """
+    _write(path, source, boom, {}, {}, why)
+
+
+def _write(
+    path: str | Path,
+    source: str | Path | None,
+    boom: Boom,
+    bodies: dict[str, str],
+    friction: dict[str, str],
+    payload: str | None,
+) -> None:
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
+    file = BOOM_FILE if source is None else Path(source)
+    try:
+        document = tomlkit.parse(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+    except (TOMLKitError, UnicodeDecodeError) as error:
+        raise InputError(f"{file}: not valid TOML: {error}") from None
+    for name, why in bodies.items():
+        document["bodies"][name].update(_body_table(boom.bodies[name]) | {"basis": "measured", "source": why})  # type: ignore[index, union-attr]
+    if payload is not None:
+        document["payload"].update(_body_table(boom.payload) | {"basis": "measured", "source": payload})  # type: ignore[union-attr]
+    for i, joint in enumerate(JOINTS):
+        if joint in friction:
+            document["joints"][joint]["friction"] = _friction_table(boom, i, friction[joint])  # type: ignore[index]
+    with replacing(path) as temporary:
+        Path(temporary).write_text(tomlkit.dumps(document), encoding="utf-8")
+
+
+def _body_table(body: Body) -> dict[str, object]:
+    inertia: Array = (body.inertia + body.inertia.T) / 2.0
+    return {
+        "mass_kg": _digits(body.mass),
+        "com_m": [_digits(x) for x in body.com],
+        _INERTIA: [[_digits(x) for x in row] for row in inertia],
+    }
+
+
+def _friction_table(boom: Boom, joint: int, why: str) -> dict[str, object]:
+    viscous, dry = ("viscous_N_s_per_m", "N") if IS_LENGTH[joint] else ("viscous_Nm_s_per_rad", "Nm")
+    friction = boom.friction
+    coulomb = _digits(friction.coulomb[joint])
+    return {
+        viscous: _digits(friction.viscous[joint]),
+        f"coulomb_{dry}": coulomb,
+        f"asymmetric_{dry}": float(np.clip(_digits(friction.asymmetric[joint]), -coulomb, coulomb)),
+        "basis": "measured",
+        "source": why,
+    }
+
+
+def _digits(value: float) -> float:
+    """The number with ten significant digits: less would make a thin body's inertia one that no solid has."""
+    return float(f"{value:.10g}")
