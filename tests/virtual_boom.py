@@ -124,3 +124,17 @@ def fourier(boom: Boom, rng: np.random.Generator, period: float = 10.0, harmonic
         return centre + scale * (q - middle), scale * qd, scale * qdd
 
     return motion
+
+
+def quintic(start: Array, goal: Array, duration: float) -> Motion:
+    """A move from rest to rest."""
+
+    def motion(t: Array) -> tuple[Array, Array, Array]:
+        s = np.clip(t / duration, 0.0, 1.0)[:, None]
+        shape = 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5
+        rate = (30.0 * s**2 - 60.0 * s**3 + 30.0 * s**4) / duration
+        change = (60.0 * s - 180.0 * s**2 + 120.0 * s**3) / duration**2
+        way = goal - start
+        return start + way * shape, way * rate, way * change
+
+    return motion

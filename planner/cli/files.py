@@ -99,6 +99,9 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     help="Largest tip error allowed.",
 )
 @click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="A recording of both, for `boom view`.")
+@click.option(
+    "--after", type=click.Path(), metavar="FILE.toml", help="The boom as identified: the log's torques before and after."
+)
 @payload_option
 @payload_as_option
 @boom_option
@@ -111,6 +114,7 @@ def compare(
     window: float | None,
     tolerance: float | None,
     out: str | None,
+    after: str | None,
     payload: float | None,
     payload_as: Any,
     boom_file: str | None,
@@ -137,7 +141,7 @@ def compare(
         raise InputError(f"offset {offset!r} is neither a number of seconds nor best") from None
     if shift is not None:
         TIME.require("offset", shift)
-    files = outputs(out, inputs=(planned, measured, boom_file))
+    files = outputs(out, inputs=(planned, measured, boom_file, after))
     found = compare_motions(
         load_boom(boom_file, payload),
         read_motion(planned),
@@ -145,6 +149,7 @@ def compare(
         offset=shift,
         window=USUAL_WINDOW if window is None else window,
         payload_as=payload_as,
+        after=None if after is None else load_boom(after, payload),
     )
     written = {}
     if out is not None:
@@ -207,6 +212,13 @@ def _print_comparison(answer: dict[str, Any], asked: str, verdict: str | None, w
     print_lines(None, [asked, *([] if verdict is None else [verdict])])
     print_lines(None, comparison.summary(answer))
     print_rows(comparison.ANSWER_HEADER, map(comparison.answer_cells, answer["joints"]), drop=("RMS", "at"))
+    if answer["joints"][0]["torque"]["parts_after"] is not None:
+        if answer["joints"][0]["torque"]["logged_less_after"] is not None:
+            click.echo("Torques of the log less the model's, before and after identification, RMS")
+            print_rows(comparison.AFTER_HEADER, map(comparison.after_cells, answer["joints"]))
+        if whole:
+            click.echo("Parts of the model's torques, before and after identification, RMS")
+            print_rows(comparison.PARTS_HEADER, map(comparison.part_cells, answer["joints"]))
     if whole:
         for title, header, cells in (
             ("Positions, measured less planned", comparison.POSITION_HEADER, comparison.position_cells),

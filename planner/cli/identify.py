@@ -151,14 +151,14 @@ def _dynamics(
 def _print_dynamics(answer: dict[str, Any], logs: str, payload: float, whole: bool) -> None:
     print_lines(None, [f"{logs}: {answer['duration_s']:.1f} s of motion and torques, payload {payload:g} kg"])
     told, total = answer["told"], answer["base_parameters"]
-    print_lines(None, [f"{told} of {total} combinations of masses and friction are told better than the file tells them"])
+    print_lines(None, [f"it determines {told} of {total} combinations of masses and friction better than the boom's file"])
     rows = []
     for joint in answer["joints"]:
         parts = sorted(((size, name) for name, size in joint["parts"].items() if name != "residual"), reverse=True)
         main = ", ".join(f"{name} {size:.3g}" for size, name in parts[:2])
         figures = (f"{joint[key]:.3g}" for key in ("before", "after", "noise"))
         rows.append((f"{joint['joint']} [{joint['unit']}]", *figures, main))
-    print_lines(None, ["Torque that is not explained, RMS of the last fifth; and what explains most of it"])
+    print_lines(None, ["Torque not explained, RMS over the last fifth, by the file and as identified"])
     print_rows(("joint", "file", "identified", "noise", "explained by"), rows)
     if whole:
         print_rows(("base parameter", "value", "+-", "file"), _cells(answer["base"] or []))

@@ -30,9 +30,10 @@ PERIOD, HARMONICS = 20.0, 5
 STEP = 0.01
 """Sampling step [s] of the motion."""
 
-_POINTS = 48
-"""Points of a period at which the criterion looks."""
+ROUNDS = 40
+"""Largest number of iterations of a design, for each of its criteria."""
 
+_POINTS = 48  # of a period, at which the criterion looks
 _FINE = 4000
 _STARTS = 12
 _PENALTY, _TARGET = 300.0, 0.985
@@ -40,7 +41,6 @@ _PENALTY, _TARGET = 300.0, 0.985
 
 _DIFFERENCE = 1e-6
 _SMOOTH = 0.03
-_ROUNDS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +93,7 @@ def design(
     period: float = PERIOD,
     harmonics: int = HARMONICS,
     seed: int = 0,
+    rounds: int = ROUNDS,
     track: Track = iter,
 ) -> Excitation:
     """Return the best motion found from the best of some random ones, by BFGS with a penalty for the limits.
@@ -105,6 +106,7 @@ def design(
         period: [s]
         harmonics: H
         seed: of the random motions.
+        rounds: largest number of iterations, of each criterion.
         track: shows progress over the iterations.
 
     Raises:
@@ -120,9 +122,9 @@ def design(
     # The condition number is flat far from its least; the way there begins with the information.
     phases = [_Problem(boom, each, period, harmonics) for each in dict.fromkeys(("information", criterion))]
     best = min(starts, key=lambda each: phases[0].cost(phases[0].variables(each)))
-    x, done = phases[0].variables(best), iter(track(list(range(_ROUNDS * len(phases)))))
+    x, done = phases[0].variables(best), iter(track(list(range(rounds * len(phases)))))
     for problem in phases:
-        options = {"maxiter": _ROUNDS, "ftol": 1e-5}
+        options = {"maxiter": rounds, "ftol": 1e-5}
         found = minimize(
             problem.cost_and_slope, x, jac=True, method="L-BFGS-B", options=options, callback=lambda _: next(done, None)
         )

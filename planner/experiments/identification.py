@@ -38,6 +38,7 @@ _ITERATIONS = 6
 _STATES = 1500
 _INDEPENDENT = 1e-8  # relative to the largest column
 _LAGS = 100
+_EXACT = 1e-4  # share of its RMS to which a torque is known at best
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +151,8 @@ class _Data:
     """(5, m) torque that x must explain"""
     counts: Array
     """(5, m) samples of each block in which the joint moves"""
+    scale: Array
+    """(5,) RMS of the torques [Nm, N]"""
     noise: Array
     """(5, 90, 90) what the noise of the accelerations adds to the sum of squared rows"""
 
@@ -196,7 +199,7 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
         f"the logs tell {told} of {len(K)} combinations better than the boom's file does; the rest stay near the file. "
         "A longer motion of all joints tells more: boom identify --design",
     )  # fmt: skip
-    notes = (*dict.fromkeys(note for log in logs for note in log.notes), *silent, *delay_notes(found, seen))
+    notes = (*dict.fromkeys(note for log in logs for note in log.notes), *silent, *delay_notes(*_delay(found, seen, data, H, variance)))
     return replace(found, joints=joints, notes=notes)
 
 
@@ -204,7 +207,7 @@ def _data(unknowns: Unknowns, logs: Sequence[Readings]) -> _Data:
     parts = [_blocks(unknowns, log) for log in logs]
     rows, right, counts = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
     noise = sum((_noise_of_rows(unknowns, log, part[2]) for log, part in zip(logs, parts, strict=True)), np.zeros((5, 90, 90)))
-    return _Data(rows, right, counts, noise)
+    return _Data(rows, right, counts, unknowns.torque_scale, noise)
 
 
 def _blocks(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Array]:
@@ -263,7 +266,7 @@ def _variance(data: _Data, x: Array, H: Array, weights: Array) -> Array:
         r, rows = left[j, used], data.rows[j, used] * np.sqrt(data.counts[j, used, None])
         taken = np.einsum("mk,kl,ml->", rows, C, rows, optimize=True) / weights[j]
         found[j] = (r @ r) / max(len(r) - taken, 1.0) * autocorrelation_time(r) if len(r) else 1.0
-    return np.maximum(found, 1e-12)
+    return np.maximum(found, (_EXACT * data.scale) ** 2)
 
 
 def autocorrelation_time(r: Array) -> float:
@@ -286,6 +289,29 @@ def base_columns(boom: Boom) -> tuple[Array, Array]:
     """
     _, chosen, sizes = _structure(boom, False)
     return np.array(chosen), sizes
+
+
+def _delay(found: Identification, logs: Sequence[Readings], data: _Data, H: Array, variance: Array) -> tuple[float, float]:
+    """Delay [s] of the torques' time stamps and its standard deviation, fitted together with x.
+
+    A torque stamped d too late is tau(t - d), about tau - d dtau/dt. Most of that looks like other parameters; what does not
+    tells the delay.
+    """
+    slopes = []
+    for log in logs:
+        rate = -np.gradient(found.unknowns.torque(found.parameters, log), log.step, axis=0) * log.moving
+        starts = np.arange(0, len(log.t), max(1, round(BLOCK / log.step)))
+        counts = np.add.reduceat(log.moving.astype(float), starts, axis=0)
+        slopes.append((np.add.reduceat(rate, starts, axis=0) / np.maximum(counts, 1.0)).T)
+    slope = np.concatenate(slopes, axis=1)
+    weights = data.counts / variance[:, None]
+    across = np.einsum("jmk,jm->k", data.rows, weights * slope)
+    energy = float((weights * slope**2).sum() - across @ np.linalg.solve(H + np.eye(90), across))
+    if energy <= 0.0:
+        return 0.0, np.inf
+    left = data.right - data.rows @ found.x
+    C = np.linalg.solve(H + np.eye(90), np.einsum("jmk,jm->k", data.rows, weights * left))
+    return float((weights * slope * left).sum() - across @ C) / energy, 1.0 / np.sqrt(energy)
 
 
 def _base_combinations(unknowns: Unknowns) -> tuple[Array, tuple[str, ...]]:

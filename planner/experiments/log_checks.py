@@ -1,16 +1,12 @@
 """Slips that a log of torques gives away: sign, unit, side of the gearbox, and late time stamps."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boom_model import JOINTS, Boom, InputError, inverse_dynamics
 from boom_model.boom import IS_LENGTH
 from planner.experiments.readings import Readings
-
-if TYPE_CHECKING:
-    from planner.experiments.identification import Identification
 
 _SAMPLES = 4000
 _EXPLAINED = 0.5  # share of the torque beside friction that the boom's file must explain, to judge by
@@ -20,11 +16,12 @@ _NEAR = 2.0  # factor within which a gain is taken for that of another unit
 _NOTICED = 2e-3  # [s]
 
 
-def require_plausible_torques(boom: Boom, logs: Sequence[Readings]) -> None:
+def require_plausible_torques(boom: Boom, logs: Sequence[Readings], *, payload_known: bool = True) -> None:
     """Refuse torques that are not those of this boom's joints in Nm and N.
 
     Each joint's torques are fitted by gain tau_file + inertia qdd + viscous qd + coulomb sign(qd) + constant, with the torques
-    tau_file of the boom's file. Where tau_file explains most of what the rest leaves, a gain far from 1 is a slip.
+    tau_file of the boom's file. Where tau_file explains most of what the rest leaves, a gain far from 1 is a slip. If the
+    payload is not known, only a gain like that of another sign or unit is.
 
     Raises:
         InputError: a gain is negative or a power of ten or a gear ratio away from 1. The message says what it looks like.
@@ -48,7 +45,7 @@ def require_plausible_torques(boom: Boom, logs: Sequence[Readings]) -> None:
         for factor, meant in slips.items():
             if 1.0 / _NEAR < gain / factor < _NEAR:
                 _refuse(i, gain, meant)
-        if not 1.0 / _ALIKE < gain < _ALIKE:
+        if payload_known and not 1.0 / _ALIKE < gain < _ALIKE:
             _refuse(i, gain, f"are neither in {unit} nor of this boom: check the unit, the gear ratio and --payload")
 
 
@@ -77,26 +74,9 @@ def _gain(boom: Boom, logs: Sequence[Readings], joint: int) -> tuple[float, floa
     return gain, gain**2 * energy / float(tau @ tau)
 
 
-def delay_notes(found: "Identification", logs: Sequence[Readings]) -> tuple[str, ...]:
-    """Say that torques and positions seem to be stamped at different times.
-
-    A torque that is stamped d too late is tau(t - d), about tau - d dtau/dt: the residual shows d.
-    """
-    slopes, left = [], []
-    for log in logs:
-        model = found.unknowns.torque(found.parameters, log)
-        rate = np.gradient(model, log.step, axis=0)
-        used = log.moving & (np.abs(np.gradient(np.sign(log.qd), axis=0)) == 0.0)
-        weight = used / np.maximum(np.std(log.tau - model, axis=0), 1e-9)
-        slopes.append((rate * weight).ravel())
-        left.append(((model - log.tau) * weight).ravel())
-    slope, r = np.concatenate(slopes), np.concatenate(left)
-    energy = float(slope @ slope)
-    if energy == 0.0:
-        return ()
-    delay = float(slope @ r) / energy
-    sigma = float(np.sqrt(np.mean((r - delay * slope) ** 2) / energy))
-    if abs(delay) < max(_NOTICED, _SURE * sigma):
+def delay_notes(delay: float, deviation: float) -> tuple[str, ...]:
+    """Say that torques and positions seem to be stamped at different times, by a delay [s] and its standard deviation."""
+    if abs(delay) < max(_NOTICED, _SURE * deviation):
         return ()
     way = "late" if delay > 0.0 else "early"
-    return (f"the torques seem to be stamped {abs(delay) * 1e3:.1f} ms {way}: measure both with one clock",)
+    return (f"the torques seem to be stamped {abs(delay) * 1e3:.0f} ms {way}: measure both with one clock",)

@@ -82,7 +82,7 @@ def identify_payload(boom: Boom, logs: Sequence[Readings], *, drive_inertia: boo
     Raises:
         InputError: the torques have the wrong sign, unit or side of the gearbox.
     """
-    require_plausible_torques(boom, logs)
+    require_plausible_torques(boom, logs, payload_known=False)
     unknowns = Unknowns(boom, drive_inertia, np.ones(5))
     rows, right, used = (np.concatenate(x) for x in zip(*(_rows(unknowns, log) for log in logs), strict=True))
     variance = np.ones(5)

@@ -134,8 +134,10 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     for cutoff in usable:  # noqa: B020, the last one tried is used
         q = _low_pass(even.q, h, cutoff)
         moving = _moving(np.gradient(q, h, axis=0), noise, h, cutoff)
-        removed = np.sum((even.q - q) ** 2 * moving, axis=0)
-        if (removed <= _REMOVED * noise**2 * moving.sum(axis=0)).all():
+        edge = max(1, int(min(1.0 / cutoff, 0.25 * (even.t[-1] - even.t[0])) / h))
+        inside = moving & (np.abs(np.arange(len(q)) - 0.5 * (len(q) - 1)) < 0.5 * len(q) - edge)[:, None]
+        removed = np.sum((even.q - q) ** 2 * inside, axis=0)
+        if (removed <= _REMOVED * noise**2 * inside.sum(axis=0)).all():
             break
     filtered = even.qd is None or even.qdd is None
     if even.qd is not None and even.qdd is not None:
@@ -143,11 +145,9 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     else:
         qd, qdd = np.gradient(q, h, axis=0), np.zeros_like(q)
         qdd[1:-1] = np.diff(q, 2, axis=0) / h**2
-        edge = max(1, int(min(1.0 / cutoff, 0.25 * (even.t[-1] - even.t[0])) / h))
-    inside = slice(edge, len(q) - edge)
     notes = (*even.notes, f"positions are low-pass filtered at {cutoff:g} Hz, forwards and backwards")
     whole = Readings(even.t, q, qd, qdd, tau, moving, cutoff, noise, _noise(tau), filtered, notes)
-    return whole.part(inside)
+    return whole.part(slice(edge, len(q) - edge))
 
 
 def _moving(qd: Array, noise: Array, step: float, cutoff: float) -> Mask:

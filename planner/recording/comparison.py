@@ -10,7 +10,7 @@ from boom_model import JOINTS, forward_kinematics
 from boom_model.boom import IS_LENGTH
 from planner.experiments.comparison import Comparison
 from planner.recording.layout import eye_of, grid, scene, shown_beside, text
-from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, PAYLOAD_COLOR
+from planner.recording.palette import AFTER_COLOR, JOINT_COLORS, LIMIT_COLOR, PAYLOAD_COLOR
 from planner.recording.plots import Bundle, for_people
 from planner.recording.scene import (
     PLANNED,
@@ -39,6 +39,8 @@ def write_comparison_recording(path: str | Path, comparison: Comparison) -> None
     /plots/<quantity>/<joint>   planned and measured q and tau; measured torques too, where the log
                                 has them
     /plots/error/<joint>        measured minus planned position [deg, m]
+    /plots/left/<joint>         torques of the log less those of the model, before and after identification, where there is a
+                                second model
     /plots/error/tip            distance between the two tips [mm]
 
     Args:
@@ -93,6 +95,13 @@ def _bundles(c: Comparison) -> dict[str, list[Bundle]]:
         if c.tau_logged is not None:
             names, colors = [*names, "measured"], [*both, PAYLOAD_COLOR]
             torques.append(c.tau_logged)
+        if c.tau_after is not None:
+            names, colors = [*names, "identified model"], [*colors, AFTER_COLOR]
+            torques.append(c.tau_after)
+        if c.tau_logged is not None and c.tau_after is not None:
+            left = np.stack([(c.tau_logged - tau)[:, i] for tau in (c.tau_measured, c.tau_after)], axis=-1)
+            words, shades = ["before", "after"], [LIMIT_COLOR, AFTER_COLOR]
+            tabs["Errors"].append(Bundle(f"plots/left/{joint}", f"{joint}: log less model [{force}]", words, shades, left))
         values = np.stack([tau[:, i] for tau in torques], axis=-1)
         name = "force" if IS_LENGTH[i] else "torque"
         tabs["Torques"].append(Bundle(f"plots/tau/{joint}", f"{joint} {name} [{force}]", names, colors, values))

@@ -34,6 +34,9 @@ MOVE_COLORS = (ORANGE, SKY_BLUE, GREEN, YELLOW, PURPLE, LIGHT, BLUE, GREY)
 """Colours of several moves in one recording, in this order."""
 
 LIMIT_COLOR = VERMILION
+AFTER_COLOR = GREEN
+"""A model as identified."""
+
 PIN_COLOR = DARK
 PAYLOAD_COLOR = LIGHT
 TOTAL_COLOR = LIGHT
