@@ -26,6 +26,7 @@ _SUBSTEPS = 4
 _FREQUENCY = 25.0  # [rad/s] of the controller
 _VISCOUS, _DRY = np.array([20.0, 20.0, 20.0, 50.0, 0.5]), np.array([15.0, 15.0, 15.0, 20.0, 1.0])
 
+
 def true_parameters(truth: Boom) -> Array:
     """The parameters (90,) of `Unknowns` that the experiment has."""
     bodies = [body_parameters(truth.bodies[name]) for name in IDENTIFIED_BODIES]

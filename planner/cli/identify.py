@@ -38,7 +38,11 @@ _SURE = 1.96
 )
 @click.option("--drive-inertia", is_flag=True, help="The torques accelerate the drives' rotors too; currents always do.")
 @click.option(
-    "--cutoff", type=float, callback=plausible(_CUTOFF), metavar="HZ", help="Low-pass filter of the positions; else it is found."
+    "--cutoff",
+    type=float,
+    callback=plausible(_CUTOFF),
+    metavar="HZ",
+    help="Low-pass filter of the positions; else it is found.",
 )
 @click.option("--out", type=OutFile(".toml"), metavar="FILE.toml", help="The boom's file with what was measured.")
 @click.option(
@@ -175,7 +179,8 @@ def _print_dynamics(answer: dict[str, Any], logs: str, payload: float, whole: bo
 
 def _cells(parameters: list[dict[str, Any]]) -> list[tuple[str, ...]]:
     return [
-        (each["name"], f"{each['value']:.4g}", f"{_SURE * each['deviation']:.2g}", f"{each['start']:.4g}") for each in parameters
+        (each["name"], f"{each['value']:.4g}", f"{_SURE * each['deviation']:.2g}", f"{each['start']:.4g}")
+        for each in parameters
     ]
 
 
@@ -207,7 +212,9 @@ def _payload(
     low, high = answer["interval_kg"]
     print_lines(None, [f"{', '.join(logs)}: {sum(log.t[-1] - log.t[0] for log in read):.1f} s of motion and torques"])
     print_lines(None, [f"payload {answer['mass_kg']:.3f} kg, with 95 % between {low:.3f} and {high:.3f} kg"])
-    com = ", ".join(f"{1e3 * x:.1f} +- {1e3 * _SURE * s:.1f}" for x, s in zip(found.boom.payload.com, found.com_deviation, strict=True))
+    com = ", ".join(
+        f"{1e3 * x:.1f} +- {1e3 * _SURE * s:.1f}" for x, s in zip(found.boom.payload.com, found.com_deviation, strict=True)
+    )
     print_lines(None, [f"centre of mass from the tip, in frame 11: {com} mm"])
     print_lines("note", [f"the move does not tell {axis}; it is held at the file's figure" for axis in found.held])
     print_rows(

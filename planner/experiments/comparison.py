@@ -430,7 +430,6 @@ def logged_cells(joint: dict[str, Any]) -> tuple[str, ...]:
 
 def after_cells(joint: dict[str, Any]) -> tuple[str, ...]:
     """Return a joint of `Comparison.to_json` as table cells under AFTER_HEADER."""
-    torque = joint["torque"]
     rms = (_torque_cells(joint, name)[3] for name in ("logged_less_measured", "logged_less_after"))
     return joint["joint"], *rms
 

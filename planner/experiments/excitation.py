@@ -125,10 +125,12 @@ def design(
     x, done = phases[0].variables(best), iter(track(list(range(rounds * len(phases)))))
     for problem in phases:
         options = {"maxiter": rounds, "ftol": 1e-5}
-        found = minimize(
-            problem.cost_and_slope, x, jac=True, method="L-BFGS-B", options=options, callback=lambda _: next(done, None)
-        )
-        x = found.x
+
+        def told(_: Array) -> None:
+            next(done, None)
+
+        # scipy's stubs lack a cost that returns its slope too
+        x = minimize(problem.cost_and_slope, x, (), "L-BFGS-B", True, options=options, callback=told).x  # type: ignore[call-overload]
     for _ in done:
         pass
     improved = _within_limits(phases[-1].excitation(x))
@@ -164,19 +166,16 @@ def _within_limits(motion: Excitation) -> Excitation | None:
 
     def scaled(k: float) -> Excitation:
         # about the mean, which stays
-        return replace(
-            motion, centre=motion.centre + (1.0 - k) * offset, sines=k * motion.sines, cosines=k * motion.cosines
-        )
+        return replace(motion, centre=motion.centre + (1.0 - k) * offset, sines=k * motion.sines, cosines=k * motion.cosines)
 
-    if scaled(1.0).worst_ratio() <= 1.0:
+    if motion.worst_ratio() <= 1.0:
         return motion
-    low, high = 0.0, 1.0
-    for _ in range(12):
-        middle = (low + high) / 2.0
-        inside = float(_ratios(motion.boom, *scaled(middle)(t[::16])).max()) <= 0.999
-        low, high = (middle, high) if inside else (low, middle)
-    found = scaled(low)
-    return found if low > 0.02 and found.worst_ratio() <= 1.0 else None
+    # Downwards in steps: holding the mean position may load a drive more than passing it does.
+    for k in np.arange(0.99, 0.02, -0.02):
+        found = scaled(float(k))
+        if _ratios(motion.boom, *found(t[::16])).max() <= 1.0 and found.worst_ratio() <= 1.0:
+            return found
+    return None
 
 
 def _worse(criterion: Criterion, a: Excitation, b: Excitation) -> bool:
@@ -213,7 +212,7 @@ def _scaled_regressor(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
 
 def _information(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
     Y = _scaled_regressor(boom, q, qd, qdd)
-    return np.einsum("njk,njl->kl", Y, Y, optimize=True) / len(q)
+    return np.asarray(np.einsum("njk,njl->kl", Y, Y, optimize=True) / len(q))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,9 @@
 """Identification of the boom's dynamics from measured motions and torques.
 
-The torques are linear in the unknown parameters (`unknowns`). The fit is weighted least squares, and each joint's weight is
-the inverse variance of its residual, found by iteration. The noise of the accelerations is in the regressor: what it adds to the
-normal equations on average is subtracted, or inertias would come out too small. Residuals of neighbouring samples may be alike; the variance is
-therefore multiplied by the residual's integrated autocorrelation time, 1 for white noise.
+The torques are linear in the unknown parameters (`unknowns`). The fit is weighted least squares. Each joint's weight is the
+inverse variance of its residual, found by iteration. Residuals of neighbouring samples may be alike; the variance is
+therefore multiplied by the residual's integrated autocorrelation time, 1 for white noise. The noise of the accelerations is
+in the regressor, and makes inertias come out too small. What it adds to the normal equations on average is subtracted.
 
 Two answers come of it. The *base parameters* are the combinations that torques can tell at all: independent columns of the
 regressor over the whole workspace, by QR with column pivoting (Gautier 1990). They are fitted to the log alone. The
@@ -110,7 +110,7 @@ class Identification:
     def deviations(self) -> Array:
         """(90,) standard deviations of p."""
         T = self.unknowns.transform
-        return np.sqrt(np.einsum("ij,jk,ik->i", T, self.covariance, T))
+        return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", T, self.covariance, T)))
 
     @cached_property
     def pseudo_inertias(self) -> Array:
@@ -181,14 +181,13 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
     unknowns = Unknowns(boom, drive_inertia, scale)
     data = _data(unknowns, seen)
     K, names = _base_combinations(unknowns)
-    x, variance = np.zeros(90), np.ones(5)
+    variance = np.ones(5)
     for _ in range(_ITERATIONS):
         H, b = _normal_equations(data, variance)
-        x = np.linalg.solve(H + np.eye(90), b)
-        variance = _variance(data, x, H, variance)
+        variance = _variance(data, np.asarray(np.linalg.solve(H + np.eye(90), b)), H, variance)
     H, b = _normal_equations(data, variance)
     x = consistent_fit(unknowns, H + np.eye(90), b)
-    covariance = np.linalg.inv(H + np.eye(90))
+    covariance = np.asarray(np.linalg.inv(H + np.eye(90)))
     told = int((np.linalg.eigvalsh(H) > 1.0).sum())
     base = _base_fit(unknowns, K, names, H, b)
     found = Identification(
@@ -199,7 +198,11 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
         f"the logs tell {told} of {len(K)} combinations better than the boom's file does; the rest stay near the file. "
         "A longer motion of all joints tells more: boom identify --design",
     )  # fmt: skip
-    notes = (*dict.fromkeys(note for log in logs for note in log.notes), *silent, *delay_notes(*_delay(found, seen, data, H, variance)))
+    notes = (
+        *dict.fromkeys(note for log in logs for note in log.notes),
+        *silent,
+        *delay_notes(*_delay(found, seen, data, H, variance)),
+    )
     return replace(found, joints=joints, notes=notes)
 
 
@@ -379,9 +382,7 @@ def _joint_fits(found: Identification, seen: Sequence[Readings], kept: Sequence[
     parts = _parts(found, [*seen, *kept])
     for i, joint in enumerate(JOINTS):
         each = {name: float(np.sqrt(np.mean(values[:, i] ** 2))) for name, values in parts.items()}
-        fits.append(
-            JointFit(joint, LOAD_UNITS[i], float(before[i]), float(after[i]), float(noise[i]), float(inside[i]), each)
-        )
+        fits.append(JointFit(joint, LOAD_UNITS[i], float(before[i]), float(after[i]), float(noise[i]), float(inside[i]), each))
     return tuple(fits)
 
 

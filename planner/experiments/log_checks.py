@@ -26,13 +26,15 @@ def require_plausible_torques(boom: Boom, logs: Sequence[Readings], *, payload_k
     Raises:
         InputError: a gain is negative or a power of ten or a gear ratio away from 1. The message says what it looks like.
     """
-    for i, joint in enumerate(JOINTS):
+    for i in range(len(JOINTS)):
         gain, explained = _gain(boom, logs, i)
         if explained < _EXPLAINED:
             continue  # friction and noise hide what the masses do
         unit = "N" if IS_LENGTH[i] else "Nm"
         if gain < 0.0:
-            _refuse(i, gain, f"look turned round: they must be positive along the joint's coordinate (multiply tau{i + 1} by -1)")
+            _refuse(
+                i, gain, f"look turned round: they must be positive along the joint's coordinate (multiply tau{i + 1} by -1)"
+            )
         drive = boom.drives[i]
         slips = {
             1e-3: f"look like k{unit}; they must be in {unit}",

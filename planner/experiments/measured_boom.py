@@ -31,7 +31,9 @@ def write_identified(path: str | Path, source: str | Path | None, found: Identif
     bodies = {}
     for k, name in enumerate(IDENTIFIED_BODIES):
         mass = deviations[10 * k]
-        bodies[name] = f"boom identify {logs}: mass to {mass:.2g} kg; torques tell combinations, the split is nearest to the CAD"
+        bodies[name] = (
+            f"boom identify {logs}: mass to {mass:.2g} kg; torques tell combinations, the split is nearest to the CAD"
+        )
     friction = {
         joint: f"boom identify {logs}: viscous to {deviations[75 + i]:.2g}, coulomb to {deviations[80 + i]:.2g}, "
         f"asymmetric to {deviations[85 + i]:.2g}"
@@ -68,12 +70,12 @@ def _write(
     except (TOMLKitError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: not valid TOML: {error}") from None
     for name, why in bodies.items():
-        document["bodies"][name].update(_body_table(boom.bodies[name]) | {"basis": "measured", "source": why})  # type: ignore[index, union-attr]
+        document["bodies"][name].update(_body_table(boom.bodies[name]) | {"basis": "measured", "source": why})
     if payload is not None:
-        document["payload"].update(_body_table(boom.payload) | {"basis": "measured", "source": payload})  # type: ignore[union-attr]
+        document["payload"].update(_body_table(boom.payload) | {"basis": "measured", "source": payload})
     for i, joint in enumerate(JOINTS):
         if joint in friction:
-            document["joints"][joint]["friction"] = _friction_table(boom, i, friction[joint])  # type: ignore[index]
+            document["joints"][joint]["friction"] = _friction_table(boom, i, friction[joint])
     with replacing(path) as temporary:
         Path(temporary).write_text(tomlkit.dumps(document), encoding="utf-8")
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from boom_model import Boom
-from boom_model.arrays import Array, read_only
+from boom_model.arrays import Array, Mask, read_only
 from boom_model.boom import Body
 from boom_model.dynamics.regressor import body_parameters
 from planner.experiments.identification import autocorrelation_time
@@ -84,7 +84,8 @@ def identify_payload(boom: Boom, logs: Sequence[Readings], *, drive_inertia: boo
     """
     require_plausible_torques(boom, logs, payload_known=False)
     unknowns = Unknowns(boom, drive_inertia, np.ones(5))
-    rows, right, used = (np.concatenate(x) for x in zip(*(_rows(unknowns, log) for log in logs), strict=True))
+    parts = [_rows(unknowns, log) for log in logs]
+    rows, right, used = (np.concatenate([part[k] for part in parts]) for k in range(3))
     variance = np.ones(5)
     x, covariance = np.zeros(4), np.eye(4)
     payload = boom.payload
@@ -115,7 +116,7 @@ def identify_payload(boom: Boom, logs: Sequence[Readings], *, drive_inertia: boo
     return PayloadFit(replace(boom, payload=body), float(np.sqrt(covariance[0, 0])), spread, residual, noise, notes)
 
 
-def _rows(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Array]:
+def _rows(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Mask]:
     """Columns of the payload (n, 5, 10), the torque (n, 5) that it must explain, and where the joints move."""
     states = (log.q, log.qd, log.qdd)
     columns = unknowns.payload_rows(*states)

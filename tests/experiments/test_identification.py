@@ -119,9 +119,7 @@ def test_the_boom_file_is_measured_and_gives_the_same_torques(tmp_path: Path) ->
     expected, log = found.boom, measured(2)
     q = log.log.q[::500]
     states = (q, np.full_like(q, 0.1), np.full_like(q, 0.2))
-    a, b = (
-        inverse_dynamics(boom.with_payload(0.0), *states, friction=True, reactions=False).tau for boom in (read, expected)
-    )
+    a, b = (inverse_dynamics(boom.with_payload(0.0), *states, friction=True, reactions=False).tau for boom in (read, expected))
     np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-6)
     for body in read.bodies.values():
         assert body.origin is not None

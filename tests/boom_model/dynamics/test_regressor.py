@@ -1,21 +1,14 @@
 """The regressor against inverse dynamics and Pinocchio's regressor carried through the loop; parameters and bodies."""
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio
 import pytest
 
-from boom_model import BaseMotion, Boom, InputError, inverse_dynamics
+from boom_model import BaseMotion, Boom, inverse_dynamics
 from boom_model.arrays import Array
 from boom_model.dynamics.regressor import (
     REGRESSOR_BODIES,
-    body_of_pseudo_inertia,
-    body_parameters,
     inertial_parameters,
-    parameters_of_pseudo_inertia,
-    pseudo_inertia,
-    pseudo_inertia_of_parameters,
     regressor,
 )
 from tests.oracles import (
