@@ -116,7 +116,7 @@ def new(out: str) -> int:
 
 
 def _measured(boom: Boom) -> Iterable[str]:
-    """What a calibration has measured."""
+    """Return what a calibration has measured."""
     g = boom.geometry
     if boom.calibration is not None:
         yield f"lengths and zeros of the joints: {boom.calibration.origin.source}"

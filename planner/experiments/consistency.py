@@ -20,7 +20,7 @@ _COLUMN, _ROW = np.tril_indices(4)
 """Entries of a symmetric matrix in Clarabel's order: upper triangle, column by column."""
 
 _TIMES = np.where(_ROW == _COLUMN, 1.0, np.sqrt(2.0))
-_UPPER = list(zip(*np.triu_indices(4), strict=True))
+_UPPER = [(row, column) for row in range(4) for column in range(row, 4)]
 
 
 def consistent_fit(unknowns: Unknowns, H: Array, b: Array) -> Array:
@@ -43,8 +43,7 @@ def consistent_fit(unknowns: Unknowns, H: Array, b: Array) -> Array:
     scale = 1.0 / np.sqrt(np.diag(H)[active])
     rows, right, cones = [], [], []
     P0, root = unknowns.metric
-    upper = [(int(r), int(c)) for r, c in _UPPER]
-    order = [upper.index((int(r), int(c))) for r, c in zip(_ROW, _COLUMN, strict=True)]
+    order = [_UPPER.index((int(r), int(c))) for r, c in zip(_ROW, _COLUMN, strict=True)]
     for k in range(len(P0)):
         inverse = np.linalg.inv(root[k])
         start = inverse @ P0[k] @ inverse - LEAST_EIGENVALUE * np.eye(4)

@@ -113,9 +113,7 @@ def design(
         InputError: fewer than 3 harmonics, or the period is not above 0.
         InfeasibleError: no random motion keeps the limits.
     """
-    from scipy.optimize import minimize as scipy_minimize
-
-    minimize: Any = scipy_minimize  # its stubs know no objective that returns its gradient
+    from scipy.optimize import minimize
 
     if harmonics < 3 or not period > 0.0:
         raise InputError(f"{harmonics} harmonics in {period:g} s: at least 3 harmonics and a period above 0 s are needed")
@@ -126,13 +124,13 @@ def design(
     best = min(starts, key=lambda each: phases[0].cost(phases[0].variables(each)))
     x, done = phases[0].variables(best), iter(track(list(range(rounds * len(phases)))))
     for problem in phases:
-        options: dict[str, Any] = {"maxiter": rounds, "ftol": 1e-5}
+        options = {"maxiter": rounds, "ftol": 1e-5}
 
-        def step(_: Array) -> None:
+        def told(_: Array) -> None:
             next(done, None)
 
-        found = minimize(problem.cost_and_slope, x, jac=True, method="L-BFGS-B", options=options, callback=step)
-        x = np.asarray(found.x)
+        # scipy's stubs lack a cost that returns its slope too
+        x = minimize(problem.cost_and_slope, x, (), "L-BFGS-B", True, options=options, callback=told).x  # type: ignore[call-overload]
     for _ in done:
         pass
     improved = _within_limits(phases[-1].excitation(x))
@@ -162,7 +160,7 @@ def random_excitation(
 
 
 def _within_limits(motion: Excitation) -> Excitation | None:
-    """Return the motion, its amplitude reduced until it keeps the limits; None if it had to stand still."""
+    """Return the motion, its amplitude reduced until it keeps the limits; None if it would have to stand still."""
     t = np.linspace(0.0, motion.period, _FINE + 1)
     offset = motion(t)[0].mean(axis=0) - motion.centre
 
@@ -170,15 +168,14 @@ def _within_limits(motion: Excitation) -> Excitation | None:
         # about the mean, which stays
         return replace(motion, centre=motion.centre + (1.0 - k) * offset, sines=k * motion.sines, cosines=k * motion.cosines)
 
-    if scaled(1.0).worst_ratio() <= 1.0:
+    if motion.worst_ratio() <= 1.0:
         return motion
-    low, high = 0.0, 1.0
-    for _ in range(12):
-        middle = (low + high) / 2.0
-        inside = float(_ratios(motion.boom, *scaled(middle)(t[::16])).max()) <= 0.999
-        low, high = (middle, high) if inside else (low, middle)
-    found = scaled(low)
-    return found if low > 0.02 and found.worst_ratio() <= 1.0 else None
+    # Downwards in steps: holding the mean position may load a drive more than passing it does.
+    for k in np.arange(0.99, 0.02, -0.02):
+        found = scaled(float(k))
+        if _ratios(motion.boom, *found(t[::16])).max() <= 1.0 and found.worst_ratio() <= 1.0:
+            return found
+    return None
 
 
 def _worse(criterion: Criterion, a: Excitation, b: Excitation) -> bool:
@@ -215,7 +212,7 @@ def _scaled_regressor(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
 
 def _information(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
     Y = _scaled_regressor(boom, q, qd, qdd)
-    return np.asarray(np.einsum("njk,njl->kl", Y, Y, optimize=True)) / len(q)
+    return np.asarray(np.einsum("njk,njl->kl", Y, Y, optimize=True) / len(q))
 
 
 @dataclass(frozen=True, eq=False)

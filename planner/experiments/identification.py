@@ -1,10 +1,9 @@
 """Identification of the boom's dynamics from measured motions and torques.
 
-The torques are linear in the unknown parameters (`unknowns`). The fit is weighted least squares.
-Each joint's weight is the inverse variance of its residual, found by iteration. The noise of the
-accelerations is in the regressor: what it adds to the normal equations on average is subtracted,
-or inertias would come out too small. Residuals of neighbouring samples may be alike; the variance
-is therefore multiplied by the residual's integrated autocorrelation time, 1 for white noise.
+The torques are linear in the unknown parameters (`unknowns`). The fit is weighted least squares. Each joint's weight is the
+inverse variance of its residual, found by iteration. Residuals of neighbouring samples may be alike; the variance is
+therefore multiplied by the residual's integrated autocorrelation time, 1 for white noise. The noise of the accelerations is
+in the regressor, and makes inertias come out too small. What it adds to the normal equations on average is subtracted.
 
 Two answers come of it. The *base parameters* are the combinations that torques can tell at all: independent columns of the
 regressor over the whole workspace, by QR with column pivoting (Gautier 1990). They are fitted to the log alone. The
@@ -182,15 +181,13 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
     unknowns = Unknowns(boom, drive_inertia, scale)
     data = _data(unknowns, seen)
     K, names = _base_combinations(unknowns)
-    x: Array = np.zeros(90)
-    variance: Array = np.ones(5)
+    variance = np.ones(5)
     for _ in range(_ITERATIONS):
         H, b = _normal_equations(data, variance)
-        x = np.asarray(np.linalg.solve(H + np.eye(90), b), dtype=float)
-        variance = _variance(data, x, H, variance)
+        variance = _variance(data, np.asarray(np.linalg.solve(H + np.eye(90), b)), H, variance)
     H, b = _normal_equations(data, variance)
     x = consistent_fit(unknowns, H + np.eye(90), b)
-    covariance: Array = np.asarray(np.linalg.inv(H + np.eye(90)), dtype=float)
+    covariance = np.asarray(np.linalg.inv(H + np.eye(90)))
     told = int((np.linalg.eigvalsh(H) > 1.0).sum())
     base = _base_fit(unknowns, K, names, H, b)
     found = Identification(

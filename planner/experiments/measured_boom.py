@@ -103,5 +103,5 @@ def _friction_table(boom: Boom, joint: int, why: str) -> dict[str, object]:
 
 
 def _digits(value: float) -> float:
-    """Return the number with ten significant digits: fewer could make an inertia that no solid has."""
+    """Return the number with ten significant digits: less would make a thin body's inertia one that no solid has."""
     return float(f"{value:.10g}")

@@ -84,7 +84,8 @@ def identify_payload(boom: Boom, logs: Sequence[Readings], *, drive_inertia: boo
     """
     require_plausible_torques(boom, logs, payload_known=False)
     unknowns = Unknowns(boom, drive_inertia, np.ones(5))
-    rows, right, used = (np.concatenate(x) for x in zip(*(_rows(unknowns, log) for log in logs), strict=True))
+    parts = [_rows(unknowns, log) for log in logs]
+    rows, right, used = (np.concatenate([part[k] for part in parts]) for k in range(3))
     variance = np.ones(5)
     x, covariance = np.zeros(4), np.eye(4)
     payload = boom.payload

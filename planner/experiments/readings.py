@@ -78,8 +78,8 @@ class Readings:
 
     def part(self, samples: slice) -> "Readings":
         """Return some of the samples."""
-        t, q, qd, qdd, tau = (x[samples] for x in (self.t, self.q, self.qd, self.qdd, self.tau))
-        return replace(self, t=t, q=q, qd=qd, qdd=qdd, tau=tau, moving=self.moving[samples])
+        names = ("t", "q", "qd", "qdd", "tau", "moving")
+        return replace(self, **{name: getattr(self, name)[samples] for name in names})
 
 
 def read_torque_log(path: str | Path, torque_per_ampere: ArrayLike | None = None) -> Log:
@@ -131,10 +131,10 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     if cutoff is not None and not 0.0 < cutoff < 0.5 / h:
         raise InputError(f"cutoff is {cutoff:g} Hz; it must be between 0 and {0.5 / h:g} Hz, half the log's sampling rate")
     usable = [cutoff] if cutoff is not None else [f for f in CUTOFFS if f < 0.4 / h] or [0.4 / h]
-    for chosen in usable:
-        q = _low_pass(even.q, h, chosen)
-        moving = _moving(np.gradient(q, h, axis=0), noise, h, chosen)
-        edge = max(1, int(min(1.0 / chosen, 0.25 * (even.t[-1] - even.t[0])) / h))
+    for used in usable:
+        q = _low_pass(even.q, h, used)
+        moving = _moving(np.gradient(q, h, axis=0), noise, h, used)
+        edge = max(1, int(min(1.0 / used, 0.25 * (even.t[-1] - even.t[0])) / h))
         inside = moving & (np.abs(np.arange(len(q)) - 0.5 * (len(q) - 1)) < 0.5 * len(q) - edge)[:, None]
         removed = np.sum((even.q - q) ** 2 * inside, axis=0)
         if (removed <= _REMOVED * noise**2 * inside.sum(axis=0)).all():
@@ -145,8 +145,8 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     else:
         qd, qdd = np.gradient(q, h, axis=0), np.zeros_like(q)
         qdd[1:-1] = np.diff(q, 2, axis=0) / h**2
-    notes = (*even.notes, f"positions are low-pass filtered at {chosen:g} Hz, forwards and backwards")
-    whole = Readings(even.t, q, qd, qdd, tau, moving, chosen, noise, _noise(tau), filtered, notes)
+    notes = (*even.notes, f"positions are low-pass filtered at {used:g} Hz, forwards and backwards")
+    whole = Readings(even.t, q, qd, qdd, tau, moving, used, noise, _noise(tau), filtered, notes)
     return whole.part(slice(edge, len(q) - edge))
 
 
