@@ -22,7 +22,10 @@ FAILS = "FAIL"
 """Name of the response that is 1 where a sample FAILs, and 0 elsewhere."""
 
 _LEAST = 32
-"""Samples below which no index is estimated."""
+"""Blocks of Saltelli's design below which no index is estimated."""
+
+_LEAST_GIVEN = 100
+"""Samples below which RBD-FAST, with its 10 harmonics, estimates no index."""
 
 _RESAMPLES = 200
 
@@ -335,7 +338,7 @@ class Results:
         design = self.study.design
         which = [i for i, factor in enumerate(design.factors) if factor.shape is not None]
         known = np.isfinite(values)
-        if known.sum() < _LEAST or np.ptp(values[known]) == 0.0 or not which:
+        if known.sum() < _LEAST_GIVEN or np.ptp(values[known]) == 0.0 or not which:
             return []
         names = [design.factors[i].name for i in which]
         X = np.asarray(design.coordinates[design.first :][known][:, which])

@@ -68,6 +68,7 @@ def _tornado(name: str, swings: list[Swing], nominal: float) -> "Figure":
     shown = swings[:_MOST_BARS][::-1]
     figure, axes = _figure(1.5 + 0.3 * len(shown))
     axes.barh([s.factor for s in shown], [s.high - s.low for s in shown], left=[s.low for s in shown], color=_PASS)
+    axes.use_sticky_edges = False  # else the first bar would start at the frame
     axes.axvline(nominal, color="black", linewidth=0.8)
     axes.set(xlabel=f"{name}; each factor a standard deviation, or a level, off nominal")
     axes.grid(alpha=0.3, axis="x")

@@ -1,5 +1,6 @@
 """Results of a study as text, Markdown and JSON."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -51,7 +52,11 @@ def percent(share: float) -> str:
 
 def summaries(results: Results) -> tuple[ResponseSummary, ...]:
     """Return the summaries of the study's responses that some sample has."""
-    return tuple(found for name in results.study.responses if (found := results.summary(name)) is not None)
+    return (
+        ()
+        if results.refused.all()
+        else tuple(found for name in results.study.responses if (found := results.summary(name)) is not None)
+    )
 
 
 def response_rows(found: Sequence[ResponseSummary]) -> list[tuple[str, ...]]:
@@ -120,7 +125,7 @@ def boundary_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ..
         (
             *each.others,
             "none" if each.largest is None else _number(each.largest),
-            each.then or "nothing up to the largest level",
+            _short(each.then),
         )
         for each in results.boundary()
     ]
@@ -215,6 +220,13 @@ def _indexed(results: Results, found: Sequence[ResponseSummary]) -> list[tuple[s
     """Return the responses with indices, FAIL first."""
     named = [(FAILS, results.indices(FAILS)), *((each.name, each.indices) for each in found)]
     return [(name, indices) for name, indices in named if indices]
+
+
+def _short(then: str | None) -> str:
+    """Return the end of a way in few words: of a sentence about a mission, what is out of reach or too fast."""
+    if then is None:
+        return "nothing up to the largest level"
+    return re.sub(r"^mission .*?, steps [^:]*: ", "", then).partition(";")[0]
 
 
 def _number(value: float) -> str:

@@ -39,9 +39,9 @@ def compute(case: Case, values: Sequence[Value]) -> dict[str, Any]:
     except InfeasibleError as error:
         return {"status": INFEASIBLE, "reason": str(error), "verdict": str(Verdict.FAIL)}
     except InputError as error:
-        return {"status": REFUSED, "reason": str(error)}
+        return {"status": REFUSED, "reason": str(error), "verdict": None}
     except (ArithmeticError, RecursionError) as error:
-        return {"status": REFUSED, "reason": f"the numbers are beyond what can be computed: {error}"}
+        return {"status": REFUSED, "reason": f"the numbers are beyond what can be computed: {error}", "verdict": None}
 
 
 def compute_chunk(case: Case, points: Points, seed: int) -> "pa.Table":
@@ -51,7 +51,8 @@ def compute_chunk(case: Case, points: Points, seed: int) -> "pa.Table":
     rows = []
     for index, point, values in points:
         factors = {factor.name: value for factor, value in zip(case.factors, values, strict=True)}
-        rows.append({"sample": index, "point": point, "seed": seed, **factors, **compute(case, values)})
+        fixed = {"sample": index, "point": point, "seed": seed, **factors}
+        rows.append({**fixed, "tightest": None, "failing": None, **compute(case, values)})
     names = list(dict.fromkeys(name for row in rows for name in row))
     return pa.table({name: _column([row.get(name) for row in rows]) for name in names})
 
