@@ -16,6 +16,7 @@ from planner.page.state import FLAGS, State, drive_field
 from planner.timing.profile import PROFILES
 
 _WIDTH = 340  # [px] of each panel: 600 px of 1280 are left for the scene
+_NARROW = 1000  # [px] of a window that has no room for a panel on either side
 SAVED = ("recording", "csv", "report", "mission", "boom", "vehicle")
 """Kinds of files, as `downloads.files_of` has them."""
 
@@ -112,8 +113,15 @@ class Panels:
         self._complaints[name] = self.gui.add_html("", visible=False)
 
 
-def build(gui: viser.GuiApi, state: State, edit: Edit) -> Panels:
-    """Build the panels of a tab: what is set on the left, what follows from it on the right."""
+def build(gui: viser.GuiApi, state: State, edit: Edit, width: int) -> Panels:
+    """Build the panels of a tab: what is set on the left, what follows from it on the right, or below on a narrow screen.
+
+    Args:
+        gui: of the tab.
+        state: its first state.
+        edit: takes a field's change.
+        width: of the window [px].
+    """
     gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False, control_width="large")
     panels = Panels(gui, edit)
     gui.main_panel.dock_left()
@@ -127,8 +135,11 @@ def build(gui: viser.GuiApi, state: State, edit: Edit) -> Panels:
         panels.place("bars", "figures", "arrows")
     with results.add_tab("Motion"):
         _motion(panels)
-    results.dock_right()
-    results.set_width(_WIDTH)
+    if width < _NARROW:
+        results.dock_below(gui.main_panel)
+    else:
+        results.dock_right()
+        results.set_width(_WIDTH)
     return panels
 
 

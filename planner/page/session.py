@@ -42,7 +42,7 @@ class Session:
         """Build the tab of a client, and show its first state."""
         self.state = first
         self._client = client
-        self._panels = build(client.gui, first, self.edit)
+        self._panels = build(client.gui, first, self.edit, client.camera.image_width)
         self._drawing = Drawing(client.scene, first.boom)
         self._solver, self._worker = Worker(partial(self._busy, "solving")), Worker(partial(self._busy, "planning"))
         self._closed = False
@@ -244,11 +244,8 @@ class Session:
     def _show_motion(self, now: State, old: State | None) -> None:
         panels, planned = self._panels, now.planned
         if old is None or planned is not old.planned or now.failure != old.failure:
-            said = (
-                f'<div id="verdict" role="alert">not possible: {escape(now.failure)}</div>'
-                if now.failure
-                else "Plan a move under Move."
-            )
+            why = f"not possible: {escape(now.failure)}" if now.failure else "Plan a move under Move."
+            said = f'<div id="verdict" role="alert">{why}</div>'
             panels.show("verdict", block(said) if planned is None else verdict_view(planned))
         if old is not None and planned is not old.planned:
             self._halt_other(planned)
@@ -278,10 +275,11 @@ class Session:
         self._fixes, folder = [], self._panels.folders["fixes"]
         folder.visible = bool(found)
         with folder:
-            for each in found:
-                button = self._client.gui.add_button(each.sentence, hint="Apply it, and plan again")
+            for k, each in enumerate(found, start=1):
+                said = self._client.gui.add_html(block(f"{k}. {escape(each.sentence)}"))
+                button = self._client.gui.add_button(f"Apply fix {k}", hint="Apply it, and plan again")
                 button.on_click(self._applies(each))
-                self._fixes.append(button)
+                self._fixes += [said, button]
 
     def _applies(self, suggestion: Suggestion) -> Callable[[Any], Coroutine[Any, Any, None]]:
         async def take(_: Any) -> None:

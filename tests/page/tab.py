@@ -101,7 +101,7 @@ class Tab:
         elif "name" in message:
             self.nodes.setdefault(message["name"], {}).update(message)
 
-    def until(self, holds: Any, seconds: float = 60.0) -> None:
+    def until(self, holds: Any, seconds: float = 30.0) -> None:
         """Take messages until something holds."""
         end = time.monotonic() + seconds
         while not holds():
