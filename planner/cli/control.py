@@ -141,6 +141,7 @@ def control(
     from planner.timing.profile import Profile
 
     boom, case = load_boom(boom_file, payload), None if move.vehicle is None else load_vehicle(move.vehicle)
+    boom.geometry.require_parallelogram("boom control")
     setup = Setup(
         goals=Goals.of(bandwidth, damping, integral),
         figures=parse_figures(figures),
