@@ -450,9 +450,7 @@ def _result(
     covariance = fit.covariance * (widened / fit.sd) ** 2
     notes = []
     if stated and widened > 1.0:
-        notes.append(
-            f"the intervals are widened by {factor:.2g}: more noise than stated, or the model lacks something"
-        )
+        notes.append(f"the intervals are widened by {factor:.2g}: more noise than stated, or the model lacks something")
     if (~fit.used).any():
         poses = np.flatnonzero(~fit.used)
         far = [f"{pose + 1} ({1e3 * float(np.linalg.norm(np.nan_to_num(fit.residuals[pose]))):.1f} mm)" for pose in poses]
