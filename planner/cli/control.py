@@ -143,6 +143,7 @@ def control(
     from planner.timing.profile import SHORTEST, Profile
 
     boom = load_boom(boom_file, payload)
+    boom.geometry.require_parallelogram("boom control")
     setup = Setup(
         vehicle=None if move.vehicle is None else load_vehicle(move.vehicle),
         goals=Goals.of(bandwidth, damping, integral),

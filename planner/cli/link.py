@@ -181,6 +181,7 @@ def link(
         raise InputError(f"{picture}: a picture is written as .png")
     files = outputs(*named.values(), document=document, inputs=(boom_file, task.links, *motions))
     boom, catalogue = load_boom(boom_file, payload), Catalogue.load().with_file(given_catalogue())
+    boom.geometry.require_parallelogram("boom link")
     planning = tracked("planning with each profile")
     trajectories = _loading(boom, moves, motions, planning)
     try:

@@ -103,6 +103,8 @@ class Calibrated:
     """(n,) False for poses left out as bad."""
     sd_factor: float
     """Residuals' standard deviation over the stated one."""
+    widened: bool
+    """Whether the intervals are wider than the stated noise makes them."""
     stated: bool
     """Whether the measurements state their standard deviation."""
     equal_links_rms: float | None
@@ -450,10 +452,7 @@ def _result(
     covariance = fit.covariance * (widened / fit.sd) ** 2
     notes = []
     if stated and widened > 1.0:
-        notes.append(
-            f"the residuals are {factor:.2g} times the stated standard deviation: the noise is larger, or something is not in "
-            "the model; the intervals are widened by this factor"
-        )
+        notes.append(f"the intervals are widened by {factor:.2g}: more noise than stated, or the model lacks something")
     if (~fit.used).any():
         poses = np.flatnonzero(~fit.used)
         far = [f"{pose + 1} ({1e3 * float(np.linalg.norm(np.nan_to_num(fit.residuals[pose]))):.1f} mm)" for pose in poses]
@@ -476,6 +475,7 @@ def _result(
         before=read_only(fit.before),
         used=fit.used,
         sd_factor=factor,
+        widened=stated and widened > 1.0,
         stated=stated,
         equal_links_rms=equal_rms,
         equal_links_chance=chance,

@@ -49,7 +49,8 @@ def sentences(found: Calibrated, check: Check | None) -> list[str]:
             f"the data allow {check.expected * 1e3:.2f} mm"
         )
     if found.stated:
-        said.append(f"the residuals are {found.sd_factor:.2g} times the stated noise")
+        wider = " (intervals are widened: --all)" if found.widened else ""
+        said.append(f"the residuals are {found.sd_factor:.2g} times the stated noise{wider}")
     else:
         said.append(f"noise of a coordinate, from the residuals: {found.sd_factor * USUAL_SD * 1e3:.2g} mm")
     said.append(_linkage(found))
