@@ -21,7 +21,7 @@ from planner.studies.designed_link import LINK_FIELDS
 from planner.studies.designs import Design, DesignKind, design
 from planner.studies.factors import Factor
 from planner.studies.tables import Tree, Value, is_numeric, merged, require_key, texts
-from planner.timing.profile import PROFILES
+from planner.timing.profile import SHORTEST
 
 _FOLDER = Path(str(files("planner.studies") / "named_studies"))
 SHORT_KEYS = ("payload", "profile")
@@ -310,7 +310,7 @@ def _all_values(keys: tuple[str, ...], inputs: Inputs, where: str) -> tuple[str,
     every = {
         "motor": tuple(inputs.catalogue.get("motors", {})),
         "gearbox": tuple(inputs.catalogue.get("gearboxes", {})),
-        "profile": tuple(map(str, PROFILES)),
+        "profile": tuple(map(str, SHORTEST)),
     }
     if len(last) != 1 or not last <= set(every):
         raise InputError(f'{where}: values = "all" is for a motor, a gearbox or a profile')
