@@ -211,21 +211,41 @@ def _winding(table: _WindingTable | None) -> Winding | None:
     return Winding(table.current_A, table.resistance_ohm, table.inductance_mH * 1e-3)
 
 
+_PER_UNIT = {
+    "Nm_per_mrad": 1e3,
+    "kg_cm2": 1e-4,
+    "kg_m2": 1.0,
+    "percent": 0.01,
+    "mrad": 1e-3,
+    "deg": np.pi / 180.0,
+    "rpm": _RPM,
+    "m_s": 1.0,
+    "mm": 1e-3,
+    "Nm": 1.0,
+    "kg": 1.0,
+    "N": 1.0,
+    "V": 1.0,
+    "m": 1.0,
+    "h": 3600.0,
+}
+"""Unit in SI of each ending of a key, the longer endings first."""
+
+
+def _in_si(table: Table, kind: type) -> dict[str, Any]:
+    """Return the numbers of a table in SI, by the names of `kind`'s fields: the keys without their units."""
+    found: dict[str, Any] = {}
+    names = {field.name for field in fields(kind)}
+    for key, value in table:
+        unit = next((unit for unit in _PER_UNIT if key.endswith(f"_{unit}")), None)
+        name = key if unit is None else key.removesuffix(f"_{unit}")
+        if name in names and (unit is not None or isinstance(value, float)):
+            found[name] = value if unit is None or value is None else value * _PER_UNIT[unit]
+    return found
+
+
 def _motor(name: str, t: _MotorTable) -> Motor:
-    return Motor(
-        name=name,
-        source=t.source,
-        step=float(np.radians(t.step_deg)),
-        max_voltage=t.max_voltage_V,
-        holding_torque=t.holding_torque_Nm,
-        running_torque=t.running_torque_Nm,
-        mass=t.mass_kg,
-        rotor_inertia=_scaled(t.rotor_inertia_kg_cm2, 1e-4),
-        parallel=_winding(t.parallel),
-        series=_winding(t.series),
-        microstep_accuracy=_scaled(t.microstep_accuracy_deg, np.pi / 180.0),
-        tolerance=_scaled(t.tolerance_percent, 0.01),
-    )
+    values = _in_si(t, Motor)
+    return Motor(name=name, source=t.source, parallel=_winding(t.parallel), series=_winding(t.series), **values)
 
 
 def _gearbox(name: str, t: _GearboxTable) -> Gearbox:
@@ -234,40 +254,11 @@ def _gearbox(name: str, t: _GearboxTable) -> Gearbox:
     return Gearbox(
         name=name,
         source=t.source,
-        ratio=t.ratio,
-        continuous_torque=t.continuous_torque_Nm,
-        start_stop_torque=t.start_stop_torque_Nm,
-        max_average_torque=t.max_average_torque_Nm,
-        peak_torque=t.peak_torque_Nm,
-        efficiency=_scaled(t.efficiency_percent, 0.01),
-        no_load_input_torque=t.no_load_input_torque_Nm,
-        starting_torque=t.starting_torque_Nm,
-        backdrive_torque=t.backdrive_torque_Nm,
-        mass=t.mass_kg,
-        input_inertia=t.input_inertia_kg_m2,
         torsion_torques=None if None in torques else torques,  # type: ignore[arg-type]
         torsion_stiffness=None if None in stiffness else stiffness,  # type: ignore[arg-type]
-        backlash=_scaled(t.backlash_mrad, 1e-3),
-        hysteresis=_scaled(t.hysteresis_mrad, 1e-3),
-        max_input_speed=_scaled(t.max_input_speed_rpm, _RPM),
-        max_average_input_speed=_scaled(t.max_average_input_speed_rpm, _RPM),
-        rated_life=_scaled(t.rated_life_h, 3600.0),
-        rated_input_speed=_scaled(t.rated_input_speed_rpm, _RPM),
+        **_in_si(t, Gearbox),
     )
 
 
 def _actuator(name: str, t: _ActuatorTable) -> LinearActuator:
-    return LinearActuator(
-        name=name,
-        source=t.source,
-        rated_force=t.rated_force_N,
-        peak_force=t.peak_force_N,
-        static_force=t.static_force_N,
-        max_speed=t.max_speed_m_s,
-        stroke=t.stroke_m,
-        lead=_scaled(t.lead_mm, 1e-3),
-        efficiency=_scaled(t.efficiency_percent, 0.01),
-        backdrive_force=t.backdrive_force_N,
-        duty=_scaled(t.duty_percent, 0.01),
-        mass=t.mass_kg,
-    )
+    return LinearActuator(name=name, source=t.source, **_in_si(t, LinearActuator))
