@@ -122,7 +122,7 @@ def power_bundles(powers: Sequence[JointPower]) -> Iterator[Bundle]:
             "at the joint": (power.output, JOINT_COLORS[power.joint]),
             "windings": (power.copper, ORANGE),
             "gear loss": (power.gear_loss, PURPLE),
-            "electrical": (power.electrical, SKY_BLUE),
+            "electrical": (power.electrical, GREEN),
         }
         series = {name: (values, color) for name, (values, color) in known.items() if values is not None}
         title = f"{power.joint} power [W]"
