@@ -16,6 +16,7 @@ from planner.move_spec import MoveSpec
 from planner.paths.targets import resolve
 from planner.planning import plan_motion
 from planner.progress import Track
+from planner.timing.profile import TimeOptimal
 
 _MAX_FACTOR = 4.0
 """Largest factor tried on a gear ratio, a drive or limits."""
@@ -111,7 +112,8 @@ def _duration(boom: Boom, spec: MoveSpec) -> Iterator[Suggestion]:
     if spec.duration is None:
         return
     try:
-        least = plan_motion(boom, replace(spec, duration=None)).duration
+        profile = TimeOptimal() if spec.profile.needs_duration else spec.profile
+        least = plan_motion(boom, replace(spec, profile=profile, duration=None)).duration
     except InfeasibleError:
         return
     rounded = float(np.ceil(least * 100.0) / 100.0)

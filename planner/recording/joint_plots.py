@@ -124,11 +124,13 @@ def power_bundles(powers: Sequence[JointPower]) -> Iterator[Bundle]:
             "at the joint": (power.output, JOINT_COLORS[power.joint]),
             "windings": (power.copper, ORANGE),
             "gear loss": (power.gear_loss, PURPLE),
-            "electrical": (power.electrical, SKY_BLUE),
+            "electrical": (power.electrical, GREEN),
         }
         series = {name: (values, color) for name, (values, color) in known.items() if values is not None}
+        title = f"{power.joint} power [W]"
+        names = [*series] if len(series) > 1 else [title]
         colors, values = [color for _, color in series.values()], [values for values, _ in series.values()]
-        yield Bundle(f"plots/power/{power.joint}", f"{power.joint} power [W]", [*series], colors, np.stack(values, axis=-1))
+        yield Bundle(f"plots/power/{power.joint}", title, names, colors, np.stack(values, axis=-1))
 
 
 def load_bundles(mount: Mount, loads: Loads) -> Iterator[Bundle]:

@@ -91,10 +91,13 @@ def timed(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | 
 
 
 def _least_energy(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseMotion | None) -> tuple[Motion, ...]:
-    """Return the motions of least copper loss; their shares of the duration are those of their least times."""
+    """Return the motions of least copper loss.
+
+    Each lasts its share of the duration, as their least times share it.
+    """
     shortest = replace(timing, profile=TimeOptimal())
     fastest = [_least(boom, path, shortest, base) for path in paths]
-    least, asked = sum(motion.duration for motion in fastest), timing.duration or 0.0
+    least, asked = sum(motion.duration for motion in fastest), timing.duration
     if asked < least * (1.0 - _ROUNDING):
         raise InfeasibleError(_too_short(boom, fastest, timing, asked, least, base))
     motions = []

@@ -8,9 +8,10 @@ import pytest
 
 from boom_model import Boom, InfeasibleError, InputError, inverse_dynamics
 from boom_model.drives.drive import reflected_inertia
-from planner import LeastEnergy, TimeOptimal, plan
+from planner import LeastEnergy, MoveSpec, TimeOptimal, plan
 from planner.missions.mission import load_mission, plan_cycle
 from planner.paths.path import JointLine
+from planner.suggestions import suggestions
 from planner.timing.path_limits import load_ratio
 from planner.timing.profile import SHORTEST
 from planner.timing.profiles.least_energy import least_energy
@@ -154,6 +155,12 @@ def test_a_mission_takes_the_profile(tmp_path):
         '[[steps]]\nto = "phenotyping"\nprofile = "least-energy"\nduration_s = 9\n'
     )
     assert plan_cycle(YAW, load_mission(str(file))).duty.duration == pytest.approx(9.0)
+
+
+def test_a_duration_that_is_too_short_has_a_longer_one_as_its_fix():
+    spec = MoveSpec.of("transport", "phenotyping", profile="least-energy", duration=3.0)
+    fixes = {fix.change: fix.sentence for fix in suggestions(BOOM, spec)}
+    assert fixes["duration"].startswith("a duration of 4.3")
 
 
 def test_bad_requests_are_refused():
