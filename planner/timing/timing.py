@@ -95,6 +95,8 @@ def _least_energy(boom: Boom, paths: Sequence[Path], timing: Timing, base: BaseM
 
     Each lasts its share of the duration, as their least times share it.
     """
+    if timing.duration is None:
+        raise InputError(f"the {timing.profile} profile needs a duration")
     shortest = replace(timing, profile=TimeOptimal())
     fastest = [_least(boom, path, shortest, base) for path in paths]
     least, asked = sum(motion.duration for motion in fastest), timing.duration
