@@ -24,14 +24,14 @@ _CAMERA = {
 
 
 class Tab:
-    """What a tab has been told by the server: elements by uuid, nodes of the scene, files, notifications."""
+    """What a tab has been told by the server: elements by uuid, nodes of the scene, whole files, notifications."""
 
     def __init__(self, address: str) -> None:
         self.elements: dict[str, dict[str, Any]] = {}
         self.nodes: dict[str, dict[str, Any]] = {}
         self.notes: list[dict[str, Any]] = []
         self.files: dict[str, bytes] = {}
-        self._names: dict[str, str] = {}
+        self._coming: dict[str, tuple[str, int, bytes]] = {}
         self._socket = connect(
             address.replace("http", "ws"), subprotocols=[f"viser-v{viser.__version__}"], max_size=None, compression=None
         )
@@ -90,12 +90,14 @@ class Tab:
         elif kind == "NotificationShowMessage" or kind == "NotificationMessage":
             self.notes.append(message["props"])
         elif kind == "FileTransferStartDownload":
-            self._names[message["transfer_uuid"]] = message["filename"]
-            self.files[message["filename"]] = b""
+            self._coming[message["transfer_uuid"]] = message["filename"], message["size_bytes"], b""
         elif kind == "FileTransferPart":
             content = message["content"]
             whole = content if isinstance(content, bytes) else buffers[content["__binary__"]]
-            self.files[self._names[message["transfer_uuid"]]] += whole
+            name, size, before = self._coming[message["transfer_uuid"]]
+            self._coming[message["transfer_uuid"]] = name, size, before + whole
+            if len(before + whole) == size:
+                self.files[name] = before + whole
         elif kind.startswith("Gui") and "uuid" in message and "props" in message:
             self.elements[message["uuid"]] = message["props"] | {"type": kind, "value": message.get("value")}
         elif "name" in message:

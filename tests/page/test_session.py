@@ -38,7 +38,7 @@ def test_the_numbers_are_the_librarys_to_the_printed_digits(tab):
     for label, value in (("yaw [deg]", 30.0), ("inner [deg]", 70.0), ("lower [deg]", 150.5), ("extension [m]", 0.3)):
         tab.put(label, value)
     tab.put("payload [kg]", "8")
-    tab.settle()
+    tab.until(lambda: "--payload 8" in tab.html)
     q = np.array([np.radians(30.0), np.radians(70.0), np.radians(150.5), 0.3, 0.0])
     carrying = boom.with_payload(8.0)
     loads = inverse_dynamics(carrying, q, np.zeros(5), np.zeros(5))
@@ -89,7 +89,6 @@ def test_plan_play_and_save(page, tab):
         tab._send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": kind}})
         name = downloads.files_of(state)[kind]
         tab.until(lambda name=name: tab.files.get(name))
-        tab.settle()
         assert tab.files[name] == downloads.content(state, kind)
 
 
