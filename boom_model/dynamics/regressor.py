@@ -61,8 +61,9 @@ def regressor(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, base: 
         base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level ground.
 
     Raises:
-        InputError: as `inverse_dynamics`.
+        InputError: as `inverse_dynamics`, or the linkage is no parallelogram.
     """
+    boom.geometry.require_parallelogram("the regressor")
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]

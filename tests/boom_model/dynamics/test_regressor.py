@@ -119,3 +119,10 @@ def test_shapes_broadcast_and_bad_ones_are_named(boom: Boom) -> None:
     assert regressor(boom, q, np.zeros(5), np.zeros((3, 2, 5))).shape == (3, 2, 5, 80)
     with pytest.raises(InputError, match=r"qd has shape \(4,\)"):
         regressor(boom, q, np.zeros(4), np.zeros(5))
+
+
+def test_unequal_links_are_refused():
+    boom = Boom.load()
+    unequal = replace(boom, geometry=replace(boom.geometry, upper_less_lower=1e-3))
+    with pytest.raises(InputError, match="the regressor needs a parallelogram; this boom has L5 - L3 = 1 mm"):
+        regressor(unequal, *np.zeros((3, 5)))
