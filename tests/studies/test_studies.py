@@ -20,7 +20,7 @@ from planner.studies.designs import DesignKind, design
 from planner.studies.factors import Factor
 from planner.studies.sample import compute, make
 from planner.studies.study import load_study, named_studies
-from planner.timing.profile import PROFILES
+from planner.timing.profile import SHORTEST
 from tests.builders import planned_mission
 from tests.studies.helpers import SMALL, normal, uniform
 
@@ -193,7 +193,7 @@ def test_a_move_that_cannot_be_planned_fails_with_its_reason(loaded):
 def test_a_profile_reaches_every_move(loaded):
     more = factor("profile", '["profile"]', 'values = "all"')
     study = loaded(("table-3-1", "field-day"), more=more)
-    assert study.design.factors[-1].levels == tuple(map(str, PROFILES))
+    assert study.design.factors[-1].levels == tuple(map(str, SHORTEST))
     _, mission, _ = make(study.case, (10.0, 1.0, "time-optimal"))
 
     def profiles(steps):
