@@ -1,13 +1,16 @@
-"""Reading a TOML file into a pydantic schema, with errors that name the file and the key."""
+"""TOML files: reading into a pydantic schema, with errors that name the file and the key; editing."""
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from boom_model.errors import InputError
+
+if TYPE_CHECKING:
+    from tomlkit import TOMLDocument
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -47,6 +50,23 @@ def parse_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {error}") from None
     except RecursionError:
         raise InputError(f"{path}: not valid TOML: arrays or tables are nested too deep") from None
+
+
+def editable_toml(path: Path) -> "TOMLDocument":
+    """Return the file as a document that keeps its comments when it is written again.
+
+    Raises:
+        InputError: the file cannot be read, or is not TOML.
+    """
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
+    try:
+        return tomlkit.parse(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    except (TOMLKitError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
 
 
 def validated(name: str, data: dict[str, Any], schema: type[Schema]) -> Schema:

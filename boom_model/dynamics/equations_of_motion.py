@@ -13,7 +13,7 @@ from boom_model.drives.drive import reflected_inertia
 from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.dynamics.closed_form import mass_and_bias, mass_forms
 from boom_model.dynamics.newton_euler import BASE_ENTRIES, inverse_dynamics, matched
-from boom_model.kinematics.forward import body_motion
+from boom_model.kinematics.frames import body_transforms
 
 _CHUNK = 1280
 """States at once, so that working memory does not grow with the batch."""
@@ -151,10 +151,9 @@ def potential_energy(boom: Boom, q: ArrayLike, *, up: ArrayLike = (0.0, 0.0, 1.0
         InputError: q is not finite or not (..., 5), or `up` is not finite or not (3,).
     """
     q, up = checked("q", q, 5), checked("up", up, 3)
-    zero = np.zeros(5)
-    masses = {**boom.bodies, "payload": boom.payload}
-    heights = {name: motion.com @ up for name, motion in body_motion(boom, q, zero, zero).items()}
-    return boom.gravity * np.asarray(sum(masses[name].mass * z for name, z in heights.items()))
+    poses, bodies = body_transforms(boom, q), {**boom.bodies, "tip": boom.payload}  # the payload is placed in the tip's frame
+    heights = {name: (poses[name][..., :3, :3] @ body.com + poses[name][..., :3, 3]) @ up for name, body in bodies.items()}
+    return boom.gravity * np.asarray(sum(bodies[name].mass * z for name, z in heights.items()))
 
 
 def _columns(boom: Boom, q: Array) -> Array:

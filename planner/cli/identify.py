@@ -1,5 +1,7 @@
 """Identification of the dynamics: the fit to logs, the payload alone, and the motion worth measuring."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,6 +25,7 @@ from planner.cli.printing import (
 
 if TYPE_CHECKING:
     from planner.experiments.readings import Readings
+    from planner.files import Outputs
 
 _CUTOFF = Range(0.05, 1e3, "Hz")
 _PERIOD = Range(1.0, 600.0, "s")
@@ -96,8 +99,32 @@ def identify(
     files, boom = outputs(out, inputs=(*logs, boom_file)), load_boom(boom_file, payload)
     constants = None if torque_per_ampere is None else _five(torque_per_ampere)
     read = [_readings(name, constants, cutoff) for name in logs]
-    answer = _payload if payload_only else _dynamics
-    return answer(boom, read, drive_inertia or constants is not None, files, out, boom_file, logs, as_json, whole)
+    inertia = drive_inertia or constants is not None
+    asked = _Asked(boom, read, inertia, files, out, boom_file, ", ".join(logs), as_json, whole)
+    return _payload(asked) if payload_only else _dynamics(asked)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What a fit works on, and where its answer goes."""
+
+    boom: Boom
+    read: "list[Readings]"
+    drive_inertia: bool
+    files: "Outputs"
+    out: str | None
+    boom_file: str | None
+    logs: str
+    as_json: bool
+    whole: bool
+
+    def written(self, write: Callable[[str], None]) -> dict[str, str]:
+        """Write the boom's file, if one is asked for, and return the files by kind."""
+        if self.out is None:
+            return {}
+        with self.files:
+            write(self.files.temporary(self.out))
+        return {"boom": self.out}
 
 
 def _five(text: str) -> list[float]:
@@ -120,32 +147,17 @@ def _readings(name: str, constants: list[float] | None, cutoff: float | None) ->
         raise InputError(f"{name}: {error}") from None
 
 
-def _dynamics(
-    boom: Boom,
-    read: "list[Readings]",
-    drive_inertia: bool,
-    files: Any,
-    out: str | None,
-    boom_file: str | None,
-    logs: tuple[str, ...],
-    as_json: bool,
-    whole: bool,
-) -> int:
+def _dynamics(asked: _Asked) -> int:
     from planner.experiments.identification import identify as identify_dynamics
     from planner.experiments.identification import to_json
     from planner.experiments.measured_boom import write_identified
 
-    found = identify_dynamics(boom, read, drive_inertia=drive_inertia)
-    written = {}
-    if out is not None:
-        with files:
-            write_identified(files.temporary(out), boom_file, found, ", ".join(logs))
-        written["boom"] = out
-    answer = to_json(found, written)
-    if as_json:
+    found = identify_dynamics(asked.boom, asked.read, drive_inertia=asked.drive_inertia)
+    answer = to_json(found, asked.written(lambda place: write_identified(place, asked.boom_file, found, asked.logs)))
+    if asked.as_json:
         print_json(answer)
     else:
-        _print_dynamics(answer, ", ".join(logs), boom.payload.mass, whole)
+        _print_dynamics(answer, asked.logs, asked.boom.payload.mass, asked.whole)
     worse = [joint["joint"] for joint in answer["joints"] if joint["after"] > max(joint["before"], 1.1 * joint["noise"])]
     if worse:
         complain(f"{', '.join(worse)}: the identified boom explains what was held out worse than the file; measure longer")
@@ -184,33 +196,18 @@ def _cells(parameters: list[dict[str, Any]]) -> list[tuple[str, ...]]:
     ]
 
 
-def _payload(
-    boom: Boom,
-    read: "list[Readings]",
-    drive_inertia: bool,
-    files: Any,
-    out: str | None,
-    boom_file: str | None,
-    logs: tuple[str, ...],
-    as_json: bool,
-    whole: bool,
-) -> int:
+def _payload(asked: _Asked) -> int:
     from planner.experiments.measured_boom import write_payload
     from planner.experiments.payload import identify_payload
 
-    found = identify_payload(boom, read, drive_inertia=drive_inertia)
-    written = {}
-    if out is not None:
-        why = f"boom identify --payload-only {', '.join(logs)}: to {found.deviation:.2g} kg"
-        with files:
-            write_payload(files.temporary(out), boom_file, found.boom, why)
-        written["boom"] = out
-    answer = found.to_json(written)
-    if as_json:
+    found = identify_payload(asked.boom, asked.read, drive_inertia=asked.drive_inertia)
+    why = f"boom identify --payload-only {asked.logs}: to {found.deviation:.2g} kg"
+    answer = found.to_json(asked.written(lambda place: write_payload(place, asked.boom_file, found.boom, why)))
+    if asked.as_json:
         print_json(answer)
         return 0
     low, high = answer["interval_kg"]
-    print_lines(None, [f"{', '.join(logs)}: {sum(log.t[-1] - log.t[0] for log in read):.1f} s of motion and torques"])
+    print_lines(None, [f"{asked.logs}: {sum(log.t[-1] - log.t[0] for log in asked.read):.1f} s of motion and torques"])
     print_lines(None, [f"payload {answer['mass_kg']:.3f} kg, with 95 % between {low:.3f} and {high:.3f} kg"])
     com = ", ".join(
         f"{1e3 * x:.1f} +- {1e3 * _SURE * s:.1f}" for x, s in zip(found.boom.payload.com, found.com_deviation, strict=True)
@@ -225,9 +222,9 @@ def _payload(
         ],
     )
     print_lines("note", ["the interval holds for a boom whose own figures are right: identify it first, without payload"])
-    if whole:
+    if asked.whole:
         print_lines("note", found.notes)
-    print_files(written)
+    print_files(answer["files"])
     return 0
 
 

@@ -12,6 +12,7 @@ import click
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from planner.reports.answer import Answer
     from planner.reports.report import Report
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
@@ -56,11 +57,13 @@ def print_report(
         cost: what the motion takes from the supply, in a line.
     """
     from planner.checks.rows import Verdict
+    from planner.reports.answer import answer
 
+    first = answer(report)
     if as_json:
         print_json(report.to_json(dict(written)))
     else:
-        _print_answer(report, asked, whole)
+        _print_answer(report, first, asked, whole)
         print_lines(None, [] if cost is None or whole else [cost])
         if whole:
             _print_details(report)
@@ -68,16 +71,14 @@ def print_report(
         print_lines("next", [] if then is None else [then])
     if report.verdict is not Verdict.FAIL:
         return 0
-    from planner.reports.answer import answer
-
-    complain(f"{report.verdict}: {answer(report).failed}")
+    complain(f"{report.verdict}: {first.failed}")
     return ANSWER_IS_NO
 
 
-def _print_answer(report: "Report", asked: str, whole: bool) -> None:
-    from planner.reports.answer import JOINT_HEADER, answer
+def _print_answer(report: "Report", first: "Answer", asked: str, whole: bool) -> None:
+    from planner.reports.answer import JOINT_HEADER
 
-    first, console = answer(report), new_console()
+    console = new_console()
     console.print(asked, highlight=False)
     console.print(first.sentence, style=STYLES.get(first.verdict), highlight=False)
     print_rows(

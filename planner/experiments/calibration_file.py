@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import tomlkit
-from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import Table
 
 from boom_model import JOINTS, Boom, InputError
 from boom_model.boom import IS_LENGTH
 from boom_model.boom_file import BOOM_FILE
+from boom_model.toml_file import editable_toml
 from planner.experiments.calibration import Calibrated
 from planner.experiments.calibration_model import INNER, LENGTHS, UPPER
 from planner.files import replacing
@@ -33,12 +33,7 @@ def write_calibrated(found: Calibrated, path: str | Path, boom_file: str | Path 
         InputError: a file cannot be read or written.
     """
     source = BOOM_FILE if boom_file is None else Path(boom_file)
-    try:
-        document = tomlkit.parse(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read: {error.strerror}") from None
-    except (TOMLKitError, UnicodeDecodeError) as error:
-        raise InputError(f"{source}: not valid TOML: {error}") from None
+    document = editable_toml(source)
     _write_lengths(document["geometry"], found)
     document.pop("calibration", None)
     document["calibration"] = _calibration(found)

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from boom_model import JOINTS, Body, Boom, InputError
+from boom_model import JOINTS, Body, Boom
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from boom_model.boom_file import BOOM_FILE
+from boom_model.toml_file import editable_toml
 from planner.experiments.identification import Identification
 from planner.experiments.unknowns import IDENTIFIED_BODIES
 from planner.files import replacing
@@ -60,15 +61,8 @@ def _write(
     payload: str | None,
 ) -> None:
     import tomlkit
-    from tomlkit.exceptions import TOMLKitError
 
-    file = BOOM_FILE if source is None else Path(source)
-    try:
-        document = tomlkit.parse(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
-    except (TOMLKitError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not valid TOML: {error}") from None
+    document = editable_toml(BOOM_FILE if source is None else Path(source))
     for name, why in bodies.items():
         document["bodies"][name].update(_body_table(boom.bodies[name]) | {"basis": "measured", "source": why})
     if payload is not None:

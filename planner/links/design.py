@@ -128,6 +128,21 @@ class LinkTask:
             if value is not None:
                 quantity.require(name.replace("_", " "), scalar(name.replace("_", " "), value))
 
+    def sized(self, link: Link) -> Link:
+        """Return the link with plates of the task's thickness; unchanged if it gives none."""
+        return link if self.thickness is None else replace(link, width=self.thickness * link.plates)
+
+    def limits(self, material: Material) -> Limits:
+        """Return what a design must respect in a material."""
+        return Limits(
+            stress=material.yield_stress / self.safety_factor,
+            deflection=self.deflection,
+            min_height=self.min_height,
+            max_height=self.max_height,
+            max_taper=self.max_taper,
+            buckling_factor=self.safety_factor if self.buckling else None,
+        )
+
 
 @dataclass(frozen=True)
 class Check:
@@ -278,8 +293,7 @@ def design_link(
     if not (np.isfinite(task.safety_factor) and task.safety_factor > 0.0):
         raise InputError(f"safety factor is {task.safety_factor:g}; it must be finite and above 0")
     link = load_link(boom, task.link, task.links)
-    if task.thickness is not None:
-        link = replace(link, width=task.thickness * link.plates)
+    link = task.sized(link)
     material = Material.load(task.material)
     beam = link.beam(material, task.slices)
     first, last = (round(share * beam.slices) for share in link.designed)
@@ -287,14 +301,7 @@ def design_link(
         raise InputError(f"slices is {task.slices}: the designed part of the {link.name} link has none of them; use more")
     if task.min_height >= beam.length:
         raise InputError(f"minimum height is {task.min_height:g} m; it must be below the link's length, {beam.length:g} m")
-    limits = Limits(
-        stress=material.yield_stress / task.safety_factor,
-        deflection=task.deflection,
-        min_height=task.min_height,
-        max_height=task.max_height,
-        max_taper=task.max_taper,
-        buckling_factor=task.safety_factor if task.buckling else None,
-    )
+    limits = task.limits(material)
     instants, old_load = None, None
     if load is LoadFrom.THESIS:
         if link.name != "inner":

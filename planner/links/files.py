@@ -7,8 +7,8 @@ import numpy as np
 
 from boom_model import Body
 from boom_model.boom_file import BOOM_FILE
-from boom_model.errors import InputError
 from boom_model.link_design import internal_forces
+from boom_model.toml_file import editable_toml
 from planner.files import replacing
 from planner.links.design import LinkDesign
 
@@ -94,15 +94,8 @@ def write_boom(path: str | Path, source: str | Path | None, design: LinkDesign) 
         InputError: a file cannot be read or written; an old one is left as it was.
     """
     import tomlkit
-    from tomlkit.exceptions import TOMLKitError
 
-    file = BOOM_FILE if source is None else Path(source)
-    try:
-        document = tomlkit.parse(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
-    except (TOMLKitError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: not valid TOML: {error}") from None
+    document = editable_toml(BOOM_FILE if source is None else Path(source))
     bodies = document["bodies"]
     table = bodies[design.link.name]
     for key, value in _rounded(design.body).items():

@@ -10,6 +10,7 @@ import tomlkit
 from boom_model import JOINTS, Boom, InputError, Sourced
 from boom_model.boom import IS_LENGTH
 from boom_model.boom_file import BOOM_FILE
+from boom_model.toml_file import editable_toml
 from planner.motion.trajectory import write_csv
 from planner.page.drives import NONE
 from planner.page.plans import BOOM_TOML, VEHICLE_TOML, Planned, command_line
@@ -96,11 +97,7 @@ def boom_file(state: State) -> str:
     Raises:
         InputError: the file cannot be read any more.
     """
-    file = BOOM_FILE if state.boom_file is None else Path(state.boom_file)
-    try:
-        document: Any = tomlkit.parse(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+    document: Any = editable_toml(BOOM_FILE if state.boom_file is None else Path(state.boom_file))
     for joint, name in state.swapped.items():
         table, key = document["joints"][joint], "actuator" if IS_LENGTH[JOINTS.index(joint)] else "drive"
         if name == NONE:

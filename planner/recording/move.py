@@ -125,6 +125,8 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
         row_shares=[8, 1],
     )
 
+    shown = lanes(move)
+
     def log(recording: rr.RecordingStream) -> None:
         recording.send_blueprint(shown_beside(left, rrb.Tabs(*tabs, active_tab=0), [1, 1]))
         log_properties(recording, boom, report)
@@ -133,8 +135,8 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
         log_markdown(recording, "checks", checks_markdown(report))
         log_markdown(recording, "assumptions", assumptions_markdown(boom, report))
         log_mount(recording, trajectory.t, move.vehicle)
-        log_lanes(recording, trajectory.t, lanes(move))
-        log_events(recording, move)
+        log_lanes(recording, trajectory.t, shown)
+        log_events(recording, move, shown)
         log_solids(recording, boom)
         log_motion(recording, boom, trajectory.t, trajectory.q)
         log_height(recording, boom, trajectory.t, tip)

@@ -17,6 +17,7 @@ from planner.recording.torque_ratio import torque_ratios
 AT_LIMIT = 0.99
 """Share of a limit from which on it counts as met."""
 
+_LIMIT = "states/limit"
 _NO_LIMIT, _REST = "none", "at rest"
 _ALIKE = 6  # decimals
 _STEADY = 1e-3  # of the largest rate: slower changes of speed are none
@@ -38,7 +39,7 @@ def lanes(move: Move) -> tuple[Lane, ...]:
     """Return the lanes of a move: phase, active limit and, where a drive has a brake, the brakes."""
     found = [
         Lane("states/phase", phases(move), _PHASES),
-        Lane("states/limit", active_limits(move), {_NO_LIMIT: GREY}),
+        Lane(_LIMIT, active_limits(move), {_NO_LIMIT: GREY}),
     ]
     if any(drive is not None and drive.brake is not None and drive.brake.value for drive in move.boom.drives):
         still = _at_rest(move)
@@ -90,9 +91,9 @@ def log_lanes(recording: rr.RecordingStream, t: Array, shown: Sequence[Lane]) ->
         recording.reset_time()
 
 
-def log_events(recording: rr.RecordingStream, move: Move) -> None:
+def log_events(recording: rr.RecordingStream, move: Move, shown: Sequence[Lane]) -> None:
     """Log an entry where a limit is met, and where the longest and the farthest stop would begin."""
-    t, limits = move.trajectory.t, active_limits(move)
+    t, (limits,) = move.trajectory.t, [lane.states for lane in shown if lane.entity == _LIMIT]
     for k in _changes(limits):
         if limits[k] != _NO_LIMIT:
             _log_entry(recording, float(t[k]), f"{limits[k]} reaches its limit", BLUE)

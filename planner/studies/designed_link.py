@@ -1,9 +1,7 @@
 """A link designed anew for a sample: the least mass that carries the mission's own loads."""
 
-from dataclasses import replace
-
 from boom_model import Boom, InputError
-from boom_model.link_design import LINKS, Limits, Material, least_mass, link_body, with_body
+from boom_model.link_design import LINKS, Material, least_mass, link_body, with_body
 from boom_model.link_design.link import link_of
 from boom_model.words import unknown
 from planner.links.design import LinkTask
@@ -56,18 +54,10 @@ def with_designed_link(boom: Boom, task: LinkTask, links: Tree, cycle: Cycle) ->
         InfeasibleError: no heights keep the limits.
     """
     link = link_of(boom, task.link, links, "the links' file")
-    if task.thickness is not None:
-        link = replace(link, width=task.thickness * link.plates)
+    link = task.sized(link)
     material = Material.load(task.material)
     beam = link.beam(material, task.slices)
-    limits = Limits(
-        stress=material.yield_stress / task.safety_factor,
-        deflection=task.deflection,
-        min_height=task.min_height,
-        max_height=task.max_height,
-        max_taper=task.max_taper,
-        buckling_factor=task.safety_factor,
-    )
+    limits = task.limits(material)
     cases, _ = link_cases(boom, link, [leg.trajectory for leg in cycle.legs if leg.moves])
     body = link_body(link, beam, least_mass(beam, cases, limits).heights)
     return with_body(boom, link.name, body), body.mass
