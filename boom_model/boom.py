@@ -45,6 +45,13 @@ JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
 IS_LENGTH = read_only([0, 0, 0, 1, 0]).astype(bool)
 """True where a joint coordinate is a length [m] and not an angle [rad]."""
 
+
+def in_degrees(q: ArrayLike) -> Array:
+    """Return joint positions or rates (..., 5) [rad, m] for people: degrees, the extension in metres."""
+    shown: Array = np.where(IS_LENGTH, q, np.degrees(q))
+    return shown
+
+
 LOAD_UNITS = tuple("N" if length else "Nm" for length in IS_LENGTH)
 """Unit of each joint's torque; the extension's is a force."""
 

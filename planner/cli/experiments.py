@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 from boom_model import Boom, InputError
+from boom_model.boom import in_degrees
 from boom_model.plausible import POSITION, TIP_ERROR
 from boom_model.words import numbers
 from planner.cli.completion import OneOf, OutFile
@@ -181,7 +181,7 @@ def _print_poses(boom: Boom, found: "SuggestedPoses", spread: float, written: di
     print_lines(None, [f"{len(found.q)} poses for {boom.name}, tips measured to {spread * 1e3:g} mm"])
     print_lines(None, [f"each figure becomes {found.gain:.2f} times as sure as by as many random poses"])
     shown = found.q if whole else found.q[:_FEW_POSES]
-    degrees = np.where([joint == "extension" for joint in JOINTS], shown, np.degrees(shown))
+    degrees = in_degrees(shown)
     rows = [(str(i + 1), *(f"{x:.3f}" if k == 3 else f"{x:.1f}" for k, x in enumerate(q))) for i, q in enumerate(degrees)]
     print_rows(("pose", *(f"{joint} {'m' if joint == 'extension' else 'deg'}" for joint in JOINTS)), rows)
     if len(shown) < len(found.q):

@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from boom_model import JOINTS, Boom, InputError
-from boom_model.boom import IS_LENGTH
+from boom_model.boom import IS_LENGTH, in_degrees
 from boom_model.plausible import Range
 from planner.cli.completion import OneOf, OutFile
 from planner.cli.options import all_option, boom_option, json_option, load_boom, outputs, payload_option, plausible
@@ -265,5 +265,4 @@ def _design(
 
 
 def _start(q: Any) -> str:
-    shown = [x if IS_LENGTH[i] else np.degrees(x) for i, x in enumerate(q)]
-    return "q=" + ",".join(f"{x:.4g}" for x in shown)
+    return "q=" + ",".join(f"{x:.4g}" for x in in_degrees(q))

@@ -15,7 +15,7 @@ from boom_model import (
     inverse_kinematics,
     transmission_angle,
 )
-from boom_model.boom import IS_LENGTH, LOAD_UNITS
+from boom_model.boom import IS_LENGTH, LOAD_UNITS, in_degrees
 from boom_model.kinematics.constraints import parse_constraint
 from planner.cli.completion import targets
 from planner.cli.options import (
@@ -70,7 +70,7 @@ def ik(
     elif found.solutions:
         rows, broken = [], []
         for i, s in enumerate(found.solutions):
-            q = np.where([0, 0, 0, 1, 0], s.q, np.degrees(s.q))
+            q = in_degrees(s.q)
             best = " (best)" if i == found.best else ""
             rows.append((f"{i + 1}{best}", *(f"{v:.4f}" for v in q), "yes" if s.within_limits else "no"))
             broken += [f"branch {i + 1}: {text}" for text in s.reasons]
@@ -116,7 +116,7 @@ def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
         return 0
     x, y, z = tip.position
     click.echo(f"tip at x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, pitch {np.degrees(tip.pitch):.2f} deg")
-    shown = zip(JOINTS, np.where(IS_LENGTH, q, np.degrees(q)), tau, LOAD_UNITS, IS_LENGTH, strict=True)
+    shown = zip(JOINTS, in_degrees(q), tau, LOAD_UNITS, IS_LENGTH, strict=True)
     rows = [(name, f"{at:.4f} {'m' if length else 'deg'}", f"{load:.2f} {unit}") for name, at, load, unit, length in shown]
     print_rows(("joint", "position", f"to hold {boom.payload.mass:g} kg"), rows)
     click.echo(f"transmission angle {np.degrees(transmission_angle(q)):.1f} deg; 0 deg is a flat parallelogram")

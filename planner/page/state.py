@@ -24,7 +24,7 @@ from boom_model import (
     nearest_reachable,
 )
 from boom_model.arrays import Array
-from boom_model.boom import IS_LENGTH
+from boom_model.boom import IS_LENGTH, in_degrees
 from boom_model.kinematics.constraints import parse_constraint
 from boom_model.plausible import DURATION, MASS, SLOPE
 from boom_model.words import joint_position, number
@@ -237,7 +237,7 @@ def words_of(joints: tuple[float, ...]) -> str:
 
 def shown(q: Array) -> tuple[float, ...]:
     """Return a joint position (5,) in degrees, the extension in metres."""
-    return tuple(float(value) for value in np.where(IS_LENGTH, q, np.degrees(q)))
+    return tuple(float(value) for value in in_degrees(q))
 
 
 def _rounded(q: Array) -> tuple[float, ...]:

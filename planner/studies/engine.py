@@ -106,7 +106,13 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
     """
     distributed, dask = required("distributed"), required("dask")
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    dask.config.set({"distributed.scheduler.allowed-failures": _DEATHS, "distributed.admin.log-format": "%(message)s"})
+    dask.config.set(
+        {
+            "distributed.scheduler.allowed-failures": _DEATHS,
+            "distributed.admin.log-format": "%(message)s",
+            "distributed.worker.profile.enabled": False,  # it interrupts the samples a hundred times a second
+        }
+    )
     if scheduler is None:
         # A killed run leaves its semaphores to Python's resource tracker, which would complain to the user.
         os.environ.setdefault("PYTHONWARNINGS", "ignore::UserWarning:multiprocessing.resource_tracker")

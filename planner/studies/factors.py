@@ -1,7 +1,6 @@
 """Factors of a study: what each changes, and how its values are distributed."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -58,8 +57,9 @@ class Factor:
         """Whether all its values are numbers."""
         return self.shape is not None or all(isinstance(v, int | float) and not isinstance(v, bool) for v in self.levels)
 
-    @cached_property
+    @property
     def _distribution(self) -> Any:
+        """Return the distribution; it is not kept, because a factor travels with every chunk."""
         if self.shape == "normal":
             return stats.norm(self.low, self.high)
         width = self.high - self.low
