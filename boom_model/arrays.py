@@ -36,7 +36,8 @@ def checked(name: str, values: ArrayLike, last: int | None = None) -> Array:
         raise InputError(f"{name} is not an array of numbers: {error}") from None
     if last is not None and (array.ndim == 0 or array.shape[-1] != last):
         raise InputError(f"{name} has shape {array.shape}; its last axis must have length {last}")
-    # A sum of squares is finite where all is, short of overflow: the one quick look at a small array.
+    # A sum of squares is finite where all is, short of overflow: the one quick look at a small
+    # array.
     if not isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f"{name}[{', '.join(map(str, index))}]" if index else name

@@ -77,7 +77,10 @@ _LENGTHS = {
 
 @dataclass(frozen=True, eq=False)
 class Geometry:
-    """Lengths [m] (thesis, figure 2-1). The linkage is a parallelogram where L5 = L3 and L9 = L4."""
+    """Lengths [m] (thesis, figure 2-1).
+
+    The linkage is a parallelogram where L5 = L3 and L9 = L4.
+    """
 
     L1: float
     L2: float
@@ -164,8 +167,8 @@ class Limits:
     transmission: float
     """Transmission angle [rad] below which pin forces become large, with a warning."""
     origins: Mapping[str, tuple[Origin, ...]]
-    """Origin of every value, with the keys position, velocity, acceleration and jerk (5 each), linkage
-    and transmission (1)."""
+    """Origin of every value, with the keys position, velocity, acceleration and jerk (5 each),
+    linkage and transmission (1)."""
 
     def __post_init__(self) -> None:
         for name, (angular, linear) in _LIMITS.items():
@@ -211,7 +214,10 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Friction:
-    """Joint friction, viscous qd + coulomb sign(qd) + asymmetric |sign(qd)|. Arrays (5,); 0 if not given."""
+    """Joint friction, viscous qd + coulomb sign(qd) + asymmetric |sign(qd)|.
+
+    Arrays (5,); 0 if not given.
+    """
 
     viscous: Array
     """[Nm s/rad, N s/m for the extension]"""
@@ -220,7 +226,8 @@ class Friction:
     origins: tuple[Origin | None, ...]
     """Origin of the values of each joint; None if not given."""
     asymmetric: Array = field(default_factory=lambda: read_only(np.zeros(5)))
-    """Half the difference between the dry friction forwards and backwards [Nm, N for the extension]."""
+    """Half the difference between the dry friction forwards and backwards [Nm, N for the
+    extension]."""
 
     def __post_init__(self) -> None:
         VISCOUS_FRICTION.require("viscous friction", _of_shape("viscous friction", self.viscous, (5,)))

@@ -24,7 +24,8 @@ class Calibration:
     scale: Array
     """(5,) 1 but for the extension."""
     wind_up: Array
-    """(5,) measured wind-up of a gearbox over that of its printed curve; 1 where it was not measured."""
+    """(5,) measured wind-up of a gearbox over that of its printed curve; 1 where it was not
+    measured."""
     parameters: tuple[str, ...]
     """What was measured, the rows of `covariance`."""
     covariance: Array

@@ -56,7 +56,9 @@ def number(name: str, text: str, what: str) -> float:
 
 
 def unknown(kind: str, name: object, known: Iterable[str], other: str = "") -> InputError:
-    """Return the error for a name that is none of the known ones. It suggests the nearest, whatever its case.
+    """Return the error for a name that is none of the known ones.
+
+    It suggests the nearest, whatever its case.
 
     Args:
         kind: what is named, such as "pose".

@@ -2,8 +2,9 @@
 
     python3 demos/03_one_move_every_profile.py
 
-Learn: under assumed joint limits alone the trapezoid is already the fastest; once the drives' torque-speed curve decides, only
-the time-optimal profile knows where on the path there is torque to spare, and an even slowing of the others costs a second.
+Learn: under assumed joint limits alone the trapezoid is already the fastest; once the drives'
+torque-speed curve decides, only the time-optimal profile knows where on the path there is torque to
+spare, and an even slowing of the others costs a second.
 """
 
 from boom_model import Boom

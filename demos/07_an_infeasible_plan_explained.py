@@ -2,8 +2,9 @@
 
     python3 demos/07_an_infeasible_plan_explained.py
 
-Learn: an infeasible plan names the joint, the limit and the place, splits the demand into its parts, and offers the smallest
-single changes that work; each has been planned again before it is offered.
+Learn: an infeasible plan names the joint, the limit and the place, splits the demand into its
+parts, and offers the smallest single changes that work; each has been planned again before it is
+offered.
 """
 
 from boom_model import Boom, InfeasibleError

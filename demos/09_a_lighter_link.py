@@ -2,8 +2,8 @@
 
     python3 demos/09_a_lighter_link.py [OUT.rrd]
 
-Learn: the thesis's load case asks for far more link than its own dynamics does; the least mass comes with a bound that no link
-goes below; and a lighter link saves torque, but no motor.
+Learn: the thesis's load case asks for far more link than its own dynamics does; the least mass
+comes with a bound that no link goes below; and a lighter link saves torque, but no motor.
 """
 
 import sys

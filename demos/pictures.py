@@ -1,7 +1,8 @@
 """Make the pictures of the guide: recordings drawn by the Rerun viewer without a screen.
 
-Run it as `python demos/pictures.py`. With `--check` it writes nothing, and fails if a picture in the guide is not what the
-viewer draws, or the viewer complains. It needs Vulkan; Debian's mesa-vulkan-drivers will do.
+Run it as `python demos/pictures.py`. With `--check` it writes nothing, and fails if a picture in
+the guide is not what the viewer draws, or the viewer complains. It needs Vulkan; Debian's
+mesa-vulkan-drivers will do.
 """
 
 import io

@@ -1,7 +1,7 @@
 """Write the guide's pages of transcripts: what every command answers in a terminal of 80 columns.
 
-Run it as `python demos/transcripts.py`. With `--check` it writes nothing, and fails if a page differs in more than digits, or
-an answer is longer than LONGEST lines.
+Run it as `python demos/transcripts.py`. With `--check` it writes nothing, and fails if a page
+differs in more than digits, or an answer is longer than LONGEST lines.
 """
 
 import os

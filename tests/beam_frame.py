@@ -32,7 +32,8 @@ def frequencies(boom: Boom, q: Array, stiffness: Array, inner_EI: float, extensi
     e2, p2 = _axes(q[1])
     e3, p3 = _axes(q[2])
     et, pt = _axes(turn)
-    # x = inner beam's (deflection, slope) at nodes 1..n and its slope at the root; lower angle; extension's at nodes 1..n
+    # x = inner beam's (deflection, slope) at nodes 1..n and its slope at the root; lower angle;
+    # extension's at nodes 1..n
     size = 1 + 2 * n + 1 + 2 * n
     unit = np.eye(size)
     slope_2, phi = unit[0], unit[1 + 2 * n]
@@ -84,7 +85,8 @@ def frequencies(boom: Boom, q: Array, stiffness: Array, inner_EI: float, extensi
     for behind, h in zip((pieces[1:] + pieces[:-1]) / 2.0, np.diff(pieces), strict=True):
         point(density(behind) * h, housed(behind))
     root = housed(free)
-    # The beam leaves its root towards -e3; its own axes are -e3 along and -p3 across, so that it turns as phi does.
+    # The beam leaves its root towards -e3; its own axes are -e3 along and -p3 across, so that it
+    # turns as phi does.
     nodes = [(-p3 @ root, phi)] + [(unit[2 + 2 * n + 2 * i], unit[3 + 2 * n + 2 * i]) for i in range(n)]
     beam(nodes, free, extension_EI, density(free * (1.0 - middle)), e3 @ root)
     wrist = np.outer(e3, e3 @ root) - np.outer(p3, nodes[-1][0])

@@ -5,7 +5,8 @@ import sys
 
 import pytest
 
-# The matrices here are small: BLAS's own threads only get in each other's way, and in that of pytest's workers.
+# The matrices here are small: BLAS's own threads only get in each other's way, and in that of
+# pytest's workers.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from planner import cli  # imports NumPy, which reads the variable then

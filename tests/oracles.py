@@ -237,7 +237,8 @@ def pinocchio_inverse_dynamics(
     outside = zip(instants(base, len(q)), forces, moments, strict=True)
     for row, (x, xd, xdd), (now, force, moment) in zip(needed, _tree_states(boom, q, qd, qdd), outside, strict=True):
         R = ground_axes(now.up)
-        # A free-flyer's rates are along frame 1's axes; its linear one is the spatial acceleration, a - w x v.
+        # A free-flyer's rates are along frame 1's axes; its linear one is the spatial acceleration,
+        # a - w x v.
         root = now.acceleration - np.cross(now.angular_velocity, now.velocity)
         place = np.concatenate([pinocchio.SE3ToXYZQUAT(pinocchio.SE3(R, np.zeros(3))), x])
         rate = np.concatenate([now.velocity, now.angular_velocity, xd])
@@ -300,7 +301,10 @@ class Need(NamedTuple):
 def textbook_recursion(
     boom: Boom, q: Array, qd: Array, qdd: Array, loop: Loop, base: BaseMotion | None = None
 ) -> list[TextbookFrame]:
-    """Frames 1 to 11 of one loop by eqs. 2.39-2.43 of the thesis as corrected, for one state (5,)."""
+    """Return frames 1 to 11 of one loop for one state (5,).
+
+    By eqs. 2.39-2.43 of the thesis as corrected.
+    """
     poses = frame_transforms(boom, q, loop)
     # d and theta of the DH rows are linear in q
     rate, accel = (dh_rows(boom, x, loop)[:, 2:] - dh_rows(boom, np.zeros(5), loop)[:, 2:] for x in (qd, qdd))
@@ -356,7 +360,10 @@ def textbook_needs(
 
 
 def virtual_work(boom: Boom, q: Array, needs: Mapping[str, Need]) -> Array:
-    """tau_i = sum over bodies of F . dc/dq_i + N . domega/dqd_i, (5,), at q (5,), by differences of the poses."""
+    """Return tau_i = sum over bodies of F . dc/dq_i + N . domega/dqd_i, (5,), at q (5,).
+
+    The derivatives are differences of the poses.
+    """
     point, force, moment = (np.array(part) for part in zip(*needs.values(), strict=True))
 
     def poses(at: Array) -> Array:
@@ -376,7 +383,8 @@ def virtual_work(boom: Boom, q: Array, needs: Mapping[str, Need]) -> Array:
 def generic(boom: Boom) -> Boom:
     """The boom with nothing left out or symmetric.
 
-    Full inertia tensors, centres of mass out of the arm's plane, a payload with both, friction and a drive on every joint.
+    Full inertia tensors, centres of mass out of the arm's plane, a payload with both, friction and
+    a drive on every joint.
     """
     rng = np.random.default_rng(1)
 

@@ -51,14 +51,18 @@ def copper_per_torque(drive: Drive) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class ShaftPower:
-    """Where the power of a motor's shaft goes, arrays of one shape [W]. `shaft` is the sum of the others."""
+    """Where the power of a motor's shaft goes, arrays of one shape [W].
+
+    `shaft` is the sum of the others.
+    """
 
     output: Array
     """To the joint, tau qd."""
     rotor: Array
     """Into the kinetic energy of rotor and gear input, N^2 (J_rotor + J_gear) qdd qd."""
     gear_loss: Array
-    """Lost in the gearbox while driving; braking has no credit for friction, as in `motor_torque`."""
+    """Lost in the gearbox while driving; braking has no credit for friction, as in `motor_torque`.
+    """
     shaft: Array
     """From the motor, T N qd."""
 

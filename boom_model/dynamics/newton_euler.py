@@ -37,8 +37,9 @@ from boom_model.kinematics.frames import R_LINK_BODY
 PayloadAs = Literal["mass", "force"]
 
 _CHUNK = 1280
-"""Samples at once. The working arrays of a chunk stay in the processor's cache, and OpenBLAS takes its products on one thread:
-a second one gains nothing on so thin a matrix, and waits for its turn on a busy machine."""
+"""Samples at once. The working arrays of a chunk stay in the processor's cache, and OpenBLAS takes
+its products on one thread: a second one gains nothing on so thin a matrix, and waits for its turn
+on a busy machine."""
 
 _O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
 BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
@@ -66,11 +67,13 @@ class Loads:
     """What a motion asks of the boom."""
 
     tau: Array
-    """(..., 5) joint torques [Nm], the extension's force [N], positive along the joint coordinate."""
+    """(..., 5) joint torques [Nm], the extension's force [N], positive along the joint coordinate.
+    """
     pins: PinForces | None
     """None where reactions were not asked for."""
     mount: Array | None
-    """(..., 6) force [N] and moment [Nm] of the boom on the vehicle's mount, in and about frame 1; None likewise."""
+    """(..., 6) force [N] and moment [Nm] of the boom on the vehicle's mount, in and about frame 1;
+    None likewise."""
 
 
 def inverse_dynamics(
@@ -193,7 +196,8 @@ def element_accelerations(boom: Boom, q: Array, qd: Array, qdd: Array, *base: Ar
 def element_velocities(boom: Boom, q: Array) -> Array:
     """Return db/dq (5, 3, 11, n) of every joint and vector b at n states (n, 5), along x, z and n.
 
-    Yaw turns the plane about z: x goes to -n, n to x. An angle turns its links' e to p, and p to -e.
+    Yaw turns the plane about z: x goes to -n, n to x. An angle turns its links' e to p, and p to
+    -e.
     """
     (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
     rho = boom.geometry.L7 + q[:, 3]
@@ -216,7 +220,8 @@ class Regrouped(NamedTuple):
 
     boom: Boom
     rows: Array
-    """(17, 11): Q of all bodies; then Q of the outer link (o, e2, p2) and of all beyond pins 7 and 8 (o, e3, p3)."""
+    """(17, 11): Q of all bodies; then Q of the outer link (o, e2, p2) and of all beyond pins 7 and
+    8 (o, e3, p3)."""
     torque_rows: Array
     """(11, 11): Q of all bodies alone."""
     tip: Array
@@ -279,10 +284,12 @@ def _pseudo_inertia(body: Body, R: Array) -> Array:
 
 
 _Value = Array | float
-"""(n,) of a chunk, or the number of a single state: Python's own arithmetic is ten times quicker on it than NumPy's."""
+"""(n,) of a chunk, or the number of a single state: Python's own arithmetic is ten times quicker on
+it than NumPy's."""
 
 _Rows = Array | list[list[float]]
-"""Values of vectors along x, z and n: an array (3, k, n), or three lists of k numbers of a single state."""
+"""Values of vectors along x, z and n: an array (3, k, n), or three lists of k numbers of a single
+state."""
 
 
 class _State(NamedTuple):
@@ -380,7 +387,8 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     d1, d2, d3 = angular_acceleration
     lift = (boom.gravity * up[0], boom.gravity * up[1], boom.gravity * up[2])
     a = (acceleration[0] + lift[0], acceleration[1] + lift[1], acceleration[2] + lift[2])
-    # The yaw axis is the plane's z: W' = base's + theta1'' z + W_base x theta1' z (thesis, eq. 2.40).
+    # The yaw axis is the plane's z: W' = base's + theta1'' z + W_base x theta1' z (thesis, eq.
+    # 2.40).
     return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1))
 
 
@@ -463,8 +471,9 @@ def _newton_euler(
     if out.pins is None or out.mount is None:
         return
 
-    # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from pin 6: the moments about
-    # pins 8 and 6 give the force at pin 7 across both directions, and the balance of forces the other two.
+    # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from
+    # pin 6: the moments about pins 8 and 6 give the force at pin 7 across both directions, and the
+    # balance of forces the other two.
     M_outer = about(c2, s2, 12, 13)
     M_top = about(c3, s3, 15, 16) + beyond_actuator
     sine = s3 * c2 - c3 * s2

@@ -63,7 +63,8 @@ THETA_RATES = {
         ]
     ),
 }
-"""Rates of the angles theta_i of all rows (10, 5) in a parallelogram: d(theta_i)/dt = THETA_RATES[loop][i] @ qd."""
+"""Rates of the angles theta_i of all rows (10, 5) in a parallelogram: d(theta_i)/dt =
+THETA_RATES[loop][i] @ qd."""
 
 SLIDING_ROW = 7
 """Index of the row whose d_i belongs to the extension: d(d_i)/dt = qd[3]."""

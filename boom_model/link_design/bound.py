@@ -25,8 +25,9 @@ _CLOSE = 1e-6
 def lower_bound(search: Search, H: Array, found: Optimum) -> float | None:
     """Return a mass [kg] that no link goes below, its own load included; None where none is proven.
 
-    Only load cases whose own load adds to the end load count. Of these, what pulls or presses counts
-    only where it adds as well. To leave out a constraint, or its multiplier, keeps the bound valid.
+    Only load cases whose own load adds to the end load count. Of these, what pulls or presses
+    counts only where it adds as well. To leave out a constraint, or its multiplier, keeps the bound
+    valid.
 
     There are two bounds, and the larger one is returned. The first follows the gradient of the
     Lagrangian at a nearly stationary point to the ends of the range of heights. It is within 1e-6

@@ -47,7 +47,8 @@ class Design:
     """[kg]"""
     stress_mass: float
     deflection: float
-    """[m], the largest of the load cases, with the forces and the theory that the design was made for"""
+    """[m], the largest of the load cases, with the forces and the theory that the design was made
+    for"""
     stress_deflection: float
     shear: bool
     """Whether the deflections count the sections' shear"""
@@ -56,10 +57,12 @@ class Design:
     buckling_load: float
     """Critical end load of the tapered column, the lesser of both planes [N]"""
     lower_bound: float | None
-    """[kg] No link under these limits is lighter. None where none is proven, or none within a tenth.
+    """[kg] No link under these limits is lighter. None where none is proven, or none within a
+    tenth.
 
-    The gap is below 1e-6 where every load case that matters is made worse by the own load, and tapers
-    or buckling do not act together with it; also with frozen forces. Else the bound is looser."""
+    The gap is below 1e-6 where every load case that matters is made worse by the own load, and
+    tapers or buckling do not act together with it; also with frozen forces. Else the bound is
+    looser."""
     governing: tuple[int, ...]
     """The load cases whose deflection is at its limit"""
 

@@ -28,8 +28,8 @@ class Column:
     """P_cr(H) / P"""
     forms: ColumnForms
     smoothing: float = 0.0
-    """Cost of a squared second difference of the heights, relative to their mean, over the mean cost of
-    a height. It only selects among heights that the column hardly tells apart."""
+    """Cost of a squared second difference of the heights, relative to their mean, over the mean
+    cost of a height. It only selects among heights that the column hardly tells apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,9 +127,9 @@ def convex_share(cost: Array, slope: Array) -> float:
 def dual_value(problem: Problem, m: Multipliers, value: float) -> float:
     """Return a lower bound of a . H, from multipliers and a cost that feasible heights have.
 
-    No height that costs less is above value / a. Rounding can leave cost + slope just below 0 at some
-    station, and the bound poor. Smaller multipliers of tapers and column are just as valid, so the
-    largest share of them that avoids this is tried as well.
+    No height that costs less is above value / a. Rounding can leave cost + slope just below 0 at
+    some station, and the bound poor. Smaller multipliers of tapers and column are just as valid, so
+    the largest share of them that avoids this is tried as well.
     """
     p, z = problem, m.deflections
     bending, shear, top = z @ p.bending, z @ p.shear, np.minimum(p.upper, value / p.cost)

@@ -1,7 +1,8 @@
 """The convex problem of a link at given internal forces and prices of its heights.
 
-`Search` builds the problem, adds the load cases and the buckling constraint that turn out to matter,
-and prices the own mass: what the inertia of a height adds to each force that a multiplier prices.
+`Search` builds the problem, adds the load cases and the buckling constraint that turn out to
+matter, and prices the own mass: what the inertia of a height adds to each force that a multiplier
+prices.
 """
 
 from dataclasses import replace
@@ -29,8 +30,9 @@ from boom_model.link_design.problem import Column, Problem, lower_multipliers, s
 
 _SMOOTHING = 5e-4
 """Cost of a wave of the heights, as long as a column's element and as high as their mean, relative
-to the cost of the link. The elements hardly see such waves. Without this cost, heights that buckling
-decides swing by a third of their size within an element, for less than a millionth of the mass."""
+to the cost of the link. The elements hardly see such waves. Without this cost, heights that
+buckling decides swing by a third of their size within an element, for less than a millionth of the
+mass."""
 
 _LEAST_PRICE = 0.01
 """Least price of a height, relative to its mass"""
@@ -186,9 +188,9 @@ class Search:
     def step(self, H: Array, found: Optimum, counts: Mask) -> tuple[Array, Optimum]:
         """Move heights and stress multipliers towards a stationary point of the Lagrangian.
 
-        The deflections keep their multipliers. The new heights minimise the Lagrangian at the forces
-        and prices of the old ones. Where tapers or buckling decide there is no such minimum, and
-        nothing changes.
+        The deflections keep their multipliers. The new heights minimise the Lagrangian at the
+        forces and prices of the old ones. Where tapers or buckling decide there is no such minimum,
+        and nothing changes.
 
         Args:
             H: (n + 1,) heights [m].

@@ -28,7 +28,8 @@ class Current(StrEnum):
     BRAKE = "brake"
     """As `REDUCED`, and none in a pause where a brake holds the joint."""
     LOAD = "load"
-    """Current in proportion to the motor torque, and none in a pause where a brake holds the joint."""
+    """Current in proportion to the motor torque, and none in a pause where a brake holds the joint.
+    """
 
 
 class Surplus(StrEnum):
@@ -178,7 +179,10 @@ class Balance:
 
 @dataclass(frozen=True)
 class Energy:
-    """Power and energy of a motion, or of a mission's cycle. Electrical figures are those of the known drives."""
+    """Power and energy of a motion, or of a mission's cycle.
+
+    Electrical figures are those of the known drives.
+    """
 
     supply: Supply
     duration: float

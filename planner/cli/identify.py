@@ -78,8 +78,8 @@ def identify(
 ) -> int:
     """Identify masses, centres of mass, inertias and friction from measured motions and torques.
 
-    LOG is a CSV or Parquet file: t, q1..q5, tau1..tau5 in SI. The last fifth of each is kept for validation. The payload must
-    be known (--payload), unless --payload-only asks for it.
+    LOG is a CSV or Parquet file: t, q1..q5, tau1..tau5 in SI. The last fifth of each is kept for
+    validation. The payload must be known (--payload), unless --payload-only asks for it.
 
     \b
     Examples:

@@ -25,7 +25,8 @@ from planner.control.linear import Linear, linearise
 from planner.control.plant import Plant, jacobian
 
 _NEAR = 20
-"""Samples on each side of a crossing. The influence of a cubic spline's samples falls by 0.27 each."""
+"""Samples on each side of a crossing. The influence of a cubic spline's samples falls by 0.27 each.
+"""
 
 STABLE = 1.0 + 1e-9
 """Largest magnitude of a discrete-time pole that counts as stable."""

@@ -411,7 +411,8 @@ def _closed(
             "measure at least 10 poses, better 30"
         )
     inverse = np.linalg.inv(np.einsum("nik,nil->kl", J[good], J[good]))
-    # A pose that was not used predicts itself; of one that was, (I - H)^-1 r takes its own share out.
+    # A pose that was not used predicts itself; of one that was, (I - H)^-1 r takes its own share
+    # out.
     hat = J @ inverse @ np.swapaxes(J, -1, -2)
     left = np.linalg.solve(np.eye(3) - hat * (1.0 - 1e-12), r[..., None])[..., 0]
     out = np.where(good[:, None], left, r)

@@ -37,7 +37,8 @@ TOLERANCE: Mapping[str, float] = {
     **dict.fromkeys(BASE[:3], 0.1),
     **dict.fromkeys(BASE[3:], 1.0),
 }
-"""Largest error that is expected of each parameter before the measurement [SI]; the unit of its column."""
+"""Largest error that is expected of each parameter before the measurement [SI]; the unit of its
+column."""
 
 
 class Frame(NamedTuple):

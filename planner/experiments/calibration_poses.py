@@ -1,10 +1,10 @@
 """Poses worth measuring, by D-optimality.
 
-With J_p the derivative of a pose's tip by the parameters, in standard deviations and tolerances, the
-information of a set of poses is A = I + sum J_p^T J_p: what is known beforehand, and what the poses
-add. The set of largest log det A is approached from random candidates, one pose after another, and
-then by exchanging single poses while that helps (Fedorov 1972; Sun and Hollerbach, "Observability
-index selection for robot calibration", 2008, index O1).
+With J_p the derivative of a pose's tip by the parameters, in standard deviations and tolerances,
+the information of a set of poses is A = I + sum J_p^T J_p: what is known beforehand, and what the
+poses add. The set of largest log det A is approached from random candidates, one pose after
+another, and then by exchanging single poses while that helps (Fedorov 1972; Sun and Hollerbach,
+"Observability index selection for robot calibration", 2008, index O1).
 """
 
 from dataclasses import dataclass

@@ -407,7 +407,8 @@ AFTER_HEADER = ("joint", "before", "after")
 PARTS_HEADER = ("joint", "before", "after")
 """Columns of `part_cells`: RMS of the parts of the two models' torques."""
 ANSWER_HEADER = ("joint", "largest error", "at", "RMS", "torque differs", "log differs")
-"""Columns of `answer_cells`: the torque of the measured motion less the plan's, and the log's less the model's."""
+"""Columns of `answer_cells`: the torque of the measured motion less the plan's, and the log's less
+the model's."""
 
 
 def answer_cells(joint: dict[str, Any]) -> tuple[str, ...]:

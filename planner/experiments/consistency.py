@@ -39,7 +39,8 @@ def consistent_fit(unknowns: Unknowns, H: Array, b: Array) -> Array:
 
     active = np.flatnonzero(unknowns.active)
     position = {int(k): i for i, k in enumerate(active)}
-    # Variables of unit curvature: Clarabel's accuracy then does not depend on how much the data tell.
+    # Variables of unit curvature: Clarabel's accuracy then does not depend on how much the data
+    # tell.
     scale = 1.0 / np.sqrt(np.diag(H)[active])
     rows, right, cones = [], [], []
     P0, root = unknowns.metric

@@ -37,7 +37,8 @@ _POINTS = 48  # of a period, at which the criterion looks
 _FINE = 4000
 _STARTS = 12
 _PENALTY, _TARGET = 300.0, 0.985
-"""Weight of what is beyond the limits, and the ratio from which on it counts; what is left of it costs amplitude."""
+"""Weight of what is beyond the limits, and the ratio from which on it counts; what is left of it
+costs amplitude."""
 
 _DIFFERENCE = 1e-6
 _SMOOTH = 0.03
@@ -190,7 +191,8 @@ def _basis(harmonics: int) -> tuple[Array, Array]:
     from scipy.linalg import null_space
 
     k = np.arange(1.0, harmonics + 1.0)
-    # The higher harmonics are damped, so that a step of any variable changes the accelerations alike.
+    # The higher harmonics are damped, so that a step of any variable changes the accelerations
+    # alike.
     return tuple(null_space((k**power / k)[None]) / k[:, None] for power in (1, 2))  # type: ignore[return-value]
 
 

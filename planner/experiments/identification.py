@@ -119,7 +119,10 @@ class Identification:
 
     @cached_property
     def boom(self) -> Boom:
-        """The identified boom. Its file has no place for a drive inertia, so drives stay as they were."""
+        """The identified boom.
+
+        Its file has no place for a drive inertia, so drives stay as they were.
+        """
         bodies = {name: body_of_pseudo_inertia(P) for name, P in zip(IDENTIFIED_BODIES, self.pseudo_inertias, strict=True)}
         return with_dynamics(self.unknowns.boom, bodies, *self.parameters[75:].reshape(3, 5))
 
@@ -297,8 +300,8 @@ def base_columns(boom: Boom) -> tuple[Array, Array]:
 def _delay(found: Identification, logs: Sequence[Readings], data: _Data, H: Array, variance: Array) -> tuple[float, float]:
     """Delay [s] of the torques' time stamps and its standard deviation, fitted together with x.
 
-    A torque stamped d too late is tau(t - d), about tau - d dtau/dt. Most of that looks like other parameters; what does not
-    tells the delay.
+    A torque stamped d too late is tau(t - d), about tau - d dtau/dt. Most of that looks like other
+    parameters; what does not tells the delay.
     """
     slopes = []
     for log in logs:
@@ -352,7 +355,8 @@ def _structure(boom: Boom, drive_inertia: bool) -> tuple[Array, tuple[int, ...],
 def _base_fit(unknowns: Unknowns, K: Array, names: tuple[str, ...], H: Array, b: Array) -> BaseParameters | None:
     """Least squares of the base parameters alone; None if the log does not determine them.
 
-    The torque of any x is that of K T x, so x = (K T)^+ (b - b0) is as good as any other x with these base parameters.
+    The torque of any x is that of K T x, so x = (K T)^+ (b - b0) is as good as any other x with
+    these base parameters.
     """
     inverse = np.linalg.pinv(K @ unknowns.transform)
     N = inverse.T @ H @ inverse

@@ -65,8 +65,8 @@ class Readings:
     def acceleration_variance(self, block: float) -> Array:
         """Variance (5,) of the noise of accelerations, averaged over blocks of `block` seconds.
 
-        White noise of variance v per sample of step h, through the filter's gain 1 / (1 + (f / fc)^8), two differentiations
-        and the mean over T:
+        White noise of variance v per sample of step h, through the filter's gain 1 / (1 + (f /
+        fc)^8), two differentiations and the mean over T:
 
             2 h v integral of (2 pi f)^4 (sin(pi f T) / (pi f T))^2 / (1 + (f / fc)^8)^2 df
         """

@@ -30,10 +30,12 @@ from boom_model.dynamics.regressor import (
 from planner.experiments.readings import Readings
 
 IDENTIFIED_BODIES = REGRESSOR_BODIES[:-1]
-"""Bodies whose parameters are unknown. The payload moves with the end effector and must be known."""
+"""Bodies whose parameters are unknown. The payload moves with the end effector and must be known.
+"""
 
 SPREAD = 0.3
-"""Relative standard deviation s that the figures of the boom's file are given. This is our own choice."""
+"""Relative standard deviation s that the figures of the boom's file are given. This is our own
+choice."""
 
 _RADIUS = 0.05  # [m]
 _LEAST_MASS = 1e-3  # [kg]

@@ -1,4 +1,6 @@
-"""Positions on the earth: WGS 84, earth-centred, local east-north-up, and any EPSG code. The one file that uses pyproj.
+"""Positions on the earth: WGS 84, earth-centred, local east-north-up, and any EPSG code.
+
+The one file that uses pyproj.
 
 The ECEF frame is WGS 84's earth-centred, earth-fixed one (EPSG:4978). Latitudes and longitudes are
 in radians, heights above the ellipsoid in metres.

@@ -43,13 +43,15 @@ class Estimate:
 
     names: tuple[str, ...]
     values: Array
-    """(k,) of each parameter, with its unit in its name; lever arms are whole, angles are added to the rig's"""
+    """(k,) of each parameter, with its unit in its name; lever arms are whole, angles are added to
+    the rig's"""
     covariance: Array
     """(k, k)"""
     rms: float
     """Root mean square of the residuals [m]."""
     misfit: float
-    """Chi-square of the residuals over their degrees of freedom: 1 where the standard deviations are true."""
+    """Chi-square of the residuals over their degrees of freedom: 1 where the standard deviations
+    are true."""
     used: int
     """Number of measured points used."""
 

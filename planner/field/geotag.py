@@ -33,7 +33,10 @@ _LEAP = 18.0  # [s] GPS time ahead of UTC since 2017
 
 @dataclass(frozen=True)
 class Latencies:
-    """How late [s] each time stamp is: what is stamped t was so at t - latency. Each with its standard deviation."""
+    """How late [s] each time stamp is: what is stamped t was so at t - latency.
+
+    Each with its standard deviation.
+    """
 
     position: float = 0.0
     """Of the vehicle's position."""
@@ -141,7 +144,8 @@ class Geotags:
 def ellipses(covariance: Array) -> Array:
     """Return the 95 % ellipse (n, 3) of covariances (n, 2, 2) [m^2] in east and north.
 
-    It is the long and the short half axis [m], and the angle of the long one clockwise from north [rad], in [0, pi).
+    It is the long and the short half axis [m], and the angle of the long one clockwise from north
+    [rad], in [0, pi).
     """
     found = np.full((len(covariance), 3), np.nan)
     known = np.isfinite(covariance).all(axis=(-2, -1))

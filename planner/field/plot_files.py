@@ -1,4 +1,6 @@
-"""Files of plot maps: GeoJSON, shapefile, CSV with WKT, and a trial's TOML. The one file that uses pyshp.
+"""Files of plot maps: GeoJSON, shapefile, CSV with WKT, and a trial's TOML.
+
+The one file that uses pyshp.
 
 What is written is in WGS 84 (EPSG:4326), longitude first, as QGIS reads it.
 """

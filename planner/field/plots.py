@@ -29,7 +29,8 @@ class PlotMap:
 
     names: tuple[str, ...]
     rings: tuple[tuple[Array, ...], ...]
-    """Of each plot its outer ring and its holes, each (k, 2) latitude, longitude [rad], without the first point again."""
+    """Of each plot its outer ring and its holes, each (k, 2) latitude, longitude [rad], without the
+    first point again."""
     rows: tuple[int | None, ...]
     ranges: tuple[int | None, ...]
     height: float
@@ -129,7 +130,8 @@ class Located:
     """Which plot each point is most probably on."""
 
     plot: NDArray[np.int_]
-    """(n,) index of the plot; -1 where no plot is likelier than 1 in 1000, or the point is not known"""
+    """(n,) index of the plot; -1 where no plot is likelier than 1 in 1000, or the point is not
+    known"""
     probability: Array
     """(n,) that the point is on that plot; 0 where there is none"""
     outside: Array

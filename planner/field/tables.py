@@ -15,7 +15,8 @@ from boom_model.words import nearest_name
 
 UTC_CLOCK, OWN_CLOCK = "utc", "own"
 TIME_COLUMNS = ("t", "utc", "gps_s")
-"""Seconds of a clock of its own; UTC, ISO 8601 or seconds since 1970; seconds of GPS time since 6 January 1980."""
+"""Seconds of a clock of its own; UTC, ISO 8601 or seconds since 1970; seconds of GPS time since 6
+January 1980."""
 
 _GPS_EPOCH = 315_964_800.0  # [s] of UTC
 _LEAP = 18.0  # [s] GPS time ahead of UTC since 2017

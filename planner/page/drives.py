@@ -29,7 +29,8 @@ def fitted(boom: Boom, joint: str) -> str:
 def with_drive(boom: Boom, catalogue: Catalogue, joint: str, name: str, supplies: Mapping[str, Drive]) -> Boom:
     """Return the boom with a drive of the catalogue on a joint.
 
-    Voltage, wiring and brake are those that the joint has in the boom's file, or those of the first drive there.
+    Voltage, wiring and brake are those that the joint has in the boom's file, or those of the first
+    drive there.
 
     Raises:
         InputError: there is no such drive, or the motor does not stand the voltage.

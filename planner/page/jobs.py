@@ -12,7 +12,10 @@ T = TypeVar("T")
 
 
 class Worker:
-    """Runs one job at a time in a thread. A new job, or `stop`, ends the one before at its next step."""
+    """Runs one job at a time in a thread.
+
+    A new job, or `stop`, ends the one before at its next step.
+    """
 
     def __init__(self, progress: Callable[[str, float | None], None]) -> None:
         """Args: progress: is told title and share of the running job; ("", None) when none runs."""

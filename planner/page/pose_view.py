@@ -51,7 +51,8 @@ class Bar:
     gearbox: float | None
     """Start-stop torque of the gearbox; None where none is known."""
     motor: float | None
-    """Torque of the motor at standstill less the stepper margin, or the actuator's static force; None likewise."""
+    """Torque of the motor at standstill less the stepper margin, or the actuator's static force;
+    None likewise."""
 
     @property
     def limit(self) -> float | None:

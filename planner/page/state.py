@@ -1,7 +1,8 @@
 """State of one tab: a frozen value, and the pure functions that change it.
 
-Every field of the page holds a text. `asked` has the texts as they were typed; the other attributes have what was last
-accepted. A text that is refused leaves them as they are, and `complaints` says why.
+Every field of the page holds a text. `asked` has the texts as they were typed; the other attributes
+have what was last accepted. A text that is refused leaves them as they are, and `complaints` says
+why.
 """
 
 from collections.abc import Callable, Mapping
@@ -103,7 +104,8 @@ class State:
     branches: Branches | None = None
     planned: Planned | None = None
     time: float | None = None
-    """Time in the planned motion that the boom shows [s]; None shows the joint position of the sliders."""
+    """Time in the planned motion that the boom shows [s]; None shows the joint position of the
+    sliders."""
     failure: str = ""
     """Why the last move could not be planned."""
     suggestions: tuple[Suggestion, ...] = ()

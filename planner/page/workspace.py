@@ -30,7 +30,8 @@ class Workspace:
 def workspace(boom: Boom, constraint: Constraint, pitch: float, track: Track = iter) -> Workspace:
     """Return the cells that are reached within the limits.
 
-    A constraint that chooses among branches costs a thousand times as much, and is mapped in cells twice as wide.
+    A constraint that chooses among branches costs a thousand times as much, and is mapped in cells
+    twice as wide.
 
     Args:
         boom: the boom.

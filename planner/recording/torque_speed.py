@@ -34,7 +34,8 @@ class Plane:
     torque: Array
     """(n,) absolute motor torque [Nm]"""
     reversed: Array | None
-    """(n,) absolute motor torque of the reversed motion [Nm]; None if the checks do not include it."""
+    """(n,) absolute motor torque of the reversed motion [Nm]; None if the checks do not include it.
+    """
     curve_speed: Array
     curve: Array
     basis: Basis

@@ -78,7 +78,10 @@ class Cloud:
 
 @dataclass(frozen=True, eq=False)
 class Requirement:
-    """What a drive must provide at one joint. At the extension, torques are forces [N] and angles lengths [m]."""
+    """What a drive must provide at one joint.
+
+    At the extension, torques are forces [N] and angles lengths [m].
+    """
 
     joint: str
     is_length: bool
@@ -98,7 +101,8 @@ class Requirement:
     hold: Point
     """Largest static torque. A brake must hold it without power."""
     creep: float
-    """Largest static torque with Coulomb friction [Nm], for the slowest motion through the poses."""
+    """Largest static torque with Coulomb friction [Nm], for the slowest motion through the poses.
+    """
     rms: float
     """RMS torque over the cycle [Nm]."""
     top_speed: float
@@ -107,11 +111,13 @@ class Requirement:
     braking_power: float
     """Largest power that the joint gives back [W]."""
     inertia: tuple[float, float]
-    """Smallest and largest inertia at the joint, with the others locked and without any drive [kg m^2]."""
+    """Smallest and largest inertia at the joint, with the others locked and without any drive [kg
+    m^2]."""
     largest_reflected: float
     """Largest admissible inertia of the drive at the joint [kg m^2]."""
     least_reflected: float
-    """Inertia of the rotor at the joint [kg m^2] from which on the guideline of the inertia ratio is kept."""
+    """Inertia of the rotor at the joint [kg m^2] from which on the guideline of the inertia ratio
+    is kept."""
     frequency: float
     """First frequency [Hz] that the stiffnesses give."""
     stiffness: float
@@ -119,9 +125,11 @@ class Requirement:
     stiffness_together: float
     """Stiffness [Nm/rad] for that frequency, if every joint has its own of these."""
     tip_error: float | None
-    """Error of the tip [m] that the backlash of all joints together may cause; None if not stated."""
+    """Error of the tip [m] that the backlash of all joints together may cause; None if not stated.
+    """
     backlash: float | None
-    """Largest backlash [rad] for that error; None if not stated, or if the joint does not move the tip."""
+    """Largest backlash [rad] for that error; None if not stated, or if the joint does not move the
+    tip."""
     starts: float
     """Number of moves of this joint in a cycle."""
     travel: float

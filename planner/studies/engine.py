@@ -114,7 +114,8 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
         }
     )
     if scheduler is None:
-        # A killed run leaves its semaphores to Python's resource tracker, which would complain to the user.
+        # A killed run leaves its semaphores to Python's resource tracker, which would complain to
+        # the user.
         os.environ.setdefault("PYTHONWARNINGS", "ignore::UserWarning:multiprocessing.resource_tracker")
         try:
             cluster = distributed.LocalCluster(

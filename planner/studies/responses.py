@@ -43,7 +43,8 @@ def responses(boom: Boom, cycle: Cycle, rows: Sequence[Row], joints: Sequence[st
 def _decision(_: Boom, __: Cycle, rows: Sequence[Row], joints: Sequence[str]) -> Columns:
     """Yield the verdict, which rows fail, and the largest share that is used of a limit.
 
-    A joint's speed and acceleration limits are left out of that share: the plan keeps them by itself.
+    A joint's speed and acceleration limits are left out of that share: the plan keeps them by
+    itself.
     """
     deciding = [row for row in rows if not joints or row.joint in joints]
     loads = (row for row in deciding if row.kind.part is not Part.JOINT)

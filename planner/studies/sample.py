@@ -20,14 +20,17 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 DONE, INFEASIBLE, REFUSED = "done", "infeasible", "refused"
-"""Status of a sample: checked; no motion was found, which counts as FAIL; its values make no boom, drive or mission."""
+"""Status of a sample: checked; no motion was found, which counts as FAIL; its values make no boom,
+drive or mission."""
 
 Points = Sequence[tuple[int, str, tuple[Value, ...]]]
 """Index, kind and values of each point."""
 
 
 def compute(case: Case, values: Sequence[Value]) -> dict[str, Any]:
-    """Return the columns of a sample: status, reason and responses. It depends on its arguments alone.
+    """Return the columns of a sample: status, reason and responses.
+
+    It depends on its arguments alone.
 
     Args:
         case: the study's inputs.

@@ -24,7 +24,10 @@ _STATE = "study.json"
 
 
 class Store:
-    """Finished chunks of a study, in the folder DATASET.parts. A chunk's file is whole or not there."""
+    """Finished chunks of a study, in the folder DATASET.parts.
+
+    A chunk's file is whole or not there.
+    """
 
     def __init__(self, dataset: str | Path, study: Study) -> None:
         """Args: dataset: the Parquet file that is to be written in the end."""

@@ -202,7 +202,8 @@ class LeastEnergy(TimingProfile):
     name = Profile.LEAST_ENERGY
     needs_duration = True
     within: float | None = None
-    """Largest duration along the path [s]; `timed` fills it in from the duration of the whole move."""
+    """Largest duration along the path [s]; `timed` fills it in from the duration of the whole move.
+    """
 
     def law(self, boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
         """Return the time law along a path; see `TimingProfile.law`.

@@ -1,8 +1,8 @@
 """Targets a second of the closed-form inverse kinematics, against IKPy on the same targets.
 
-IKPy solves one target from one start by least squares. It knows open chains alone: it gets the rows of the inner loop's DH
-table, its fourth joint turning by theta3 - theta2, and the extension held. Run it alone for the numbers:
-`pytest tests/benchmarks/test_inverse_kinematics.py`.
+IKPy solves one target from one start by least squares. It knows open chains alone: it gets the rows
+of the inner loop's DH table, its fourth joint turning by theta3 - theta2, and the extension held.
+Run it alone for the numbers: `pytest tests/benchmarks/test_inverse_kinematics.py`.
 """
 
 import time

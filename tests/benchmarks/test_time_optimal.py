@@ -37,7 +37,8 @@ PATH = JointLine(BOOM.pose("transport"), BOOM.pose("phenotyping"))
 ROUNDS = 9  # of both in turn, of which the best counts
 PEER_SAMPLES = 5_001
 MOST = {"time-optimal": 0.5, "jerk-limited": 1.0, "jerk bound": 2.5}
-"""Share of the peer's time that a motion may take, checks not counted; 0.45, 0.28 and 2.2 were seen."""
+"""Share of the peer's time that a motion may take, checks not counted; 0.45, 0.28 and 2.2 were
+seen."""
 TIMINGS = {
     "time-optimal": Timing.of("time-optimal"),
     "jerk-limited": Timing.of("jerk-limited"),
@@ -153,7 +154,8 @@ WHOLE = {
         0.75,
     ),
 }
-"""What a user calls, certificate and checks included, and the most of the peer's time that it may take."""
+"""What a user calls, certificate and checks included, and the most of the peer's time that it may
+take."""
 
 
 def test_a_whole_plan_takes_few_times_as_long_as_the_peers_law_alone():

@@ -44,9 +44,11 @@ def test_average_torque_on_table_2_4(joint, expected, path):
 
 
 def test_motor_rows_on_table_2_4_by_hand(path):
-    """At 10 s joint 2 rests under 155.832 Nm: 155.832 / 160 = 0.974 Nm to hold. Its inner link falls all the way, so the
-    load drives it forwards; the move reversed lifts it, at most 155.832 / (160 x 0.65) + 0.42 = 1.918 Nm and the share of the
-    inertia."""
+    """At 10 s joint 2 rests under 155.832 Nm: 155.832 / 160 = 0.974 Nm to hold.
+
+    Its inner link falls all the way, so the load drives it forwards; the move reversed lifts it, at
+    most 155.832 / (160 x 0.65) + 0.42 = 1.918 Nm and the share of the inertia.
+    """
     report = check(BOOM, path, payload_as="force")
     assert row_of(report, "inner", "motor hold").demand == pytest.approx(155.832 / 160, abs=5e-3)
     lift = row_of(report, "inner", "motor torque, reversed")

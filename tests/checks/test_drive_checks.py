@@ -139,7 +139,10 @@ def test_a_missing_figure_is_not_checkable(figure, check_name):
 
 
 def test_lifting_155_8_newton_metres_at_no_speed():
-    """155.8 / (160 x 0.65) = 1.498 Nm, and 0.42 Nm without load: 1.918 Nm. Coulomb friction is lifted with it."""
+    """155.8 / (160 x 0.65) = 1.498 Nm, and 0.42 Nm without load: 1.918 Nm.
+
+    Coulomb friction is lifted with it.
+    """
     found = row(motor_rows(joint_view(static=-155.8), DRIVE), "motor torque, quasi-static")
     assert found.demand == pytest.approx(1.498 + 0.42, abs=5e-4)
     rough = row(motor_rows(joint_view(static=-145.8, coulomb=10.0), DRIVE), "motor torque, quasi-static")
@@ -148,7 +151,10 @@ def test_lifting_155_8_newton_metres_at_no_speed():
 
 
 def test_the_other_reading_of_the_efficiency():
-    """At 172 Nm both ask 172 / (160 x 0.65) = 1.654 Nm; so eta = 1.075 / (1.654 - 0.42) = 0.871. At 155.8 Nm: 1.538 Nm."""
+    """At 172 Nm both ask 172 / (160 x 0.65) = 1.654 Nm; so eta = 1.075 / (1.654 - 0.42) = 0.871.
+
+    At 155.8 Nm: 1.538 Nm.
+    """
     eta = mesh_efficiency(GEAR)
     assert eta == pytest.approx(0.871, abs=5e-4)
     assert 172 / (160 * eta) + 0.42 == pytest.approx(172 / (160 * 0.65), rel=1e-12)

@@ -135,7 +135,8 @@ def test_profiles_stand_side_by_side(boom):
         assert row["motor_torque"] == worst["motor torque"]
         # The acceleration of a cubic and of both bang-bang laws jumps: it takes an infinite jerk.
         assert (row["jerk"] is None) == (name in ("cubic", "trapezoidal", "time-optimal"))
-    # The quintic's jerk peaks at 60 d/T^3 at its ends: the lower link's 150 degrees against its limit decide.
+    # The quintic's jerk peaks at 60 d/T^3 at its ends: the lower link's 150 degrees against its
+    # limit decide.
     limits, move = Boom.load().limits, Boom.load().pose("phenotyping") - Boom.load().pose("transport")
     expected = (60.0 * np.abs(move) / rows["quintic"]["duration_s"] ** 3 / limits.jerk).max()
     assert rows["quintic"]["jerk"] == pytest.approx(expected, rel=1e-6)

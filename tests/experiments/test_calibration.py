@@ -206,7 +206,8 @@ def test_the_written_boom_has_the_measured_figures_and_says_so(tmp_path):
     np.testing.assert_allclose([g.L2, g.L4, g.L5, g.L9], [fitted.L2, fitted.L4, fitted.L5, fitted.L9], rtol=0, atol=1e-9)
     assert "# measured: standard deviation" in file.read_text(encoding="utf-8")
     assert "Centres of mass and inertias" in file.read_text(encoding="utf-8")  # comments stay
-    # The file predicts what the calibration does: distances between tips do not depend on the frame.
+    # The file predicts what the calibration does: distances between tips do not depend on the
+    # frame.
     q = poses(rng, 20)
     own = TipModel.of(boom, np.zeros(3))
     own_steps, true_steps = (np.linalg.norm(np.diff(true_tips(m, q), axis=0), axis=-1) for m in (own, model))

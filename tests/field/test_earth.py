@@ -8,7 +8,8 @@ from geographiclib.geodesic import Geodesic
 from boom_model import InputError
 from planner.field import earth
 
-# Where, and why there: Saskatoon, south, the antimeridian, a border of UTM zones, the two poles, the equator.
+# Where, and why there: Saskatoon, south, the antimeridian, a border of UTM zones, the two poles,
+# the equator.
 PLACES = {
     "Saskatoon": (52.13, -106.62),
     "Tasmania": (-42.9, 147.3),

@@ -41,7 +41,8 @@ def test_errors_are_as_the_covariance_says():
         found = estimate(log, STAMPS, measured(STAMPS + 0.03, 200 + seed), 0.0143, SENSOR - ANTENNA)
         error = found.values - [-0.03, *(SENSOR - ANTENNA)]
         total += error @ np.linalg.solve(found.covariance, error)
-    # Between two fixes their white noise averages out, so the covariance is somewhat on the safe side.
+    # Between two fixes their white noise averages out, so the covariance is somewhat on the safe
+    # side.
     assert chi2.ppf(0.0005, 60) * 0.7 < total < chi2.ppf(0.9995, 60)
 
 

@@ -22,7 +22,8 @@ def test_layout_meets_the_corners(count, side):
     assert off < 1e-4  # up of the corners is not 0 over 20 m of round earth
     assert len(plots.names) == 40
     assert [polygon.area for polygon in plots.polygons] == pytest.approx([1.2 * 3.6] * 40, rel=1e-6)
-    # The last plot of row 1 ends at the second corner; geographiclib measures its long side on the ground.
+    # The last plot of row 1 ends at the second corner; geographiclib measures its long side on the
+    # ground.
     last = plots.rings[plots.names.index("1-4")][0]
     a, b = np.degrees(last[0]), np.degrees(last[1])
     side_on_ellipsoid = Geodesic.WGS84.Inverse(*a, *b)["s12"]

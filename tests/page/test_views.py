@@ -44,7 +44,8 @@ def test_the_mount_bears_the_weight_on_any_slope(shipped):
     level, tilted = figures(shipped), figures(shipped, Slope(roll=8.0, nose=-5.0))
     assert level["mount_Fz"] == pytest.approx(-weight, rel=1e-12)
     assert np.hypot(np.hypot(tilted["mount_Fx"], tilted["mount_Fy"]), tilted["mount_Fz"]) == pytest.approx(weight, rel=1e-12)
-    # With the left side up, the weight points to the boom's right, which is -y; with the nose up, backward, which is -x.
+    # With the left side up, the weight points to the boom's right, which is -y; with the nose up,
+    # backward, which is -x.
     assert tilted["mount_Fy"] == pytest.approx(-weight * np.cos(np.radians(5.0)) * np.sin(np.radians(8.0)), rel=1e-12)
     assert tilted["mount_Fx"] == pytest.approx(-weight * np.sin(np.radians(5.0)), rel=1e-12)
 

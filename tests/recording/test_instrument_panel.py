@@ -222,7 +222,8 @@ def test_reach_is_drawn_where_it_is_asked_for(tmp_path: Path, panel: Read, move:
     assert "/world/reach" not in panel.entities()
     points = np.concatenate([np.array(strip) for strip in strips])
     np.testing.assert_allclose(points, np.concatenate([np.insert(line, 1, 0.0, axis=1) for line in boundary(found)]), atol=1e-6)
-    # One cell inwards is within the limits, one outwards is not: each point has both among its neighbours.
+    # One cell inwards is within the limits, one outwards is not: each point has both among its
+    # neighbours.
     cell = found.r[1] - found.r[0]
     around = points[::17, None] + cell * np.array([(x, 0.0, z) for x in (-1, 0, 1) for z in (-1, 0, 1)])
     reached = [[inverse_kinematics(BOOM, point, pitch, hold).solutions for point in ring] for ring in around]

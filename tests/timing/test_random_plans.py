@@ -12,7 +12,8 @@ from tests.random_plans import random_plan
 COUNT, TOGETHER = 120, 10
 """Plans, of which 3,000 were run by hand; so many in one test."""
 BROKE_ONCE = (71, 142, 199, 394, 424, 446, 1136, 1366, 1546, 1774, 1987, 2092, 2296, 2539)
-"""Numbers of plans that broke a limit, by up to eleven times it, or crept: tiny lines, kinks, waypoints a micron apart.
+"""Numbers of plans that broke a limit, by up to eleven times it, or crept: tiny lines, kinks,
+waypoints a micron apart.
 
 71, 446 and 1546 broke it under one OpenBLAS kernel more than under another.
 """

@@ -20,7 +20,8 @@ FASTER = 2e-4
 """The collocation's own error, of which 8e-5 was seen: at the ends of its steps at most."""
 WORST_RATIO = 1.001
 SHIPPED, RAISED, FAR_RAISED, OUT_OF_THE_WAY = (1.0, 1.0), (3.0, 10.0), (8.0, 40.0), (20.0, 100.0)
-"""Factors of the joints' velocity and acceleration. With those shipped, the drives seldom decide."""
+"""Factors of the joints' velocity and acceleration. With those shipped, the drives seldom decide.
+"""
 
 
 class Case(NamedTuple):

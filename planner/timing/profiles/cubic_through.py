@@ -1,4 +1,7 @@
-"""Cubic polynomials in time through waypoints, from rest to rest (thesis, eqs. 2.72-2.78, with a waypoint between)."""
+"""Cubic polynomials in time through waypoints, from rest to rest.
+
+They are eqs. 2.72-2.78 of the thesis, with a waypoint between.
+"""
 
 from collections.abc import Callable
 
@@ -24,10 +27,11 @@ def cubic_through(boom: Boom, waypoints: Array, base: BaseMotion | None = None) 
 
     Its acceleration is continuous.
 
-    The durations between waypoints are those of the shortest such motion within the limits of joints and drives, as the
-    simplex search of Nelder and Mead finds it (Lin, Chang and Luh, IEEE Trans. Automatic Control 28, 1983): a good one, not
-    provably the best. Where the spline overshoots a position limit its velocities at the waypoints are PCHIP's instead,
-    and the acceleration jumps there.
+    The durations between waypoints are those of the shortest such motion within the limits of
+    joints and drives, as the simplex search of Nelder and Mead finds it (Lin, Chang and Luh, IEEE
+    Trans. Automatic Control 28, 1983): a good one, not provably the best. Where the spline
+    overshoots a position limit its velocities at the waypoints are PCHIP's instead, and the
+    acceleration jumps there.
 
     Raises:
         InfeasibleError: the motion would leave the position limits.

@@ -20,8 +20,9 @@ _SHAPE_SHARES = (0.5, 0.25)  # of the jerk limits, that a path's shape may take
 def jerk_bounded(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
     """Find the fastest smoothed time-optimal law within the joint limits, including jerk.
 
-    On a curved path the path's own shape asks for jerk, at a waypoint above all. Laws that are slow there, and there alone,
-    are tried besides, and one on equal steps: between near waypoints it is smoother.
+    On a curved path the path's own shape asks for jerk, at a waypoint above all. Laws that are slow
+    there, and there alone, are tried besides, and one on equal steps: between near waypoints it is
+    smoother.
 
     Raises:
         InfeasiblePathError: as `time_optimal`.
@@ -40,13 +41,15 @@ def jerk_bounded(boom: Boom, path: Path, base: BaseMotion | None = None) -> Time
 def with_jerk_bound(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None) -> TimeLaw:
     """Average a law over a window, and slow it to respect the joint limits, including jerk.
 
-    Averaging s(t) neither leaves the path nor starts or ends in motion, makes the acceleration continuous and 0 at both ends,
-    and bounds the jerk by the jump of the acceleration over the window. Where it exceeds a limit, the law is slowed evenly; the
-    window is the one that makes the whole shortest. Of the time-optimal law of a straight path under joint limits alone this
-    makes the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is not the optimum.
+    Averaging s(t) neither leaves the path nor starts or ends in motion, makes the acceleration
+    continuous and 0 at both ends, and bounds the jerk by the jump of the acceleration over the
+    window. Where it exceeds a limit, the law is slowed evenly; the window is the one that makes the
+    whole shortest. Of the time-optimal law of a straight path under joint limits alone this makes
+    the least-time jerk-limited one where the law cruises for as long as the window; elsewhere it is
+    not the optimum.
 
-    The limits are looked at in few places of each of the law's pieces, with torques interpolated along the path: between these
-    places the law may break them by a trifle.
+    The limits are looked at in few places of each of the law's pieces, with torques interpolated
+    along the path: between these places the law may break them by a trifle.
     """
     from scipy.optimize import minimize_scalar
 

@@ -16,8 +16,9 @@ _ROUNDING = 1e-9
 def jerk_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
     """Find a law from rest to rest within velocity, acceleration, jerk and drive limits.
 
-    It is ruckig's: the least-time one where the path is straight and no drive limits. Elsewhere it must be slowed, and the
-    time-optimal law with its jerk bounded can be the faster of the two: then that is taken.
+    It is ruckig's: the least-time one where the path is straight and no drive limits. Elsewhere it
+    must be slowed, and the time-optimal law with its jerk bounded can be the faster of the two:
+    then that is taken.
 
     Raises:
         InfeasibleError: ruckig found no law; carries its result.
@@ -35,8 +36,8 @@ def jerk_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> Time
 def evenly_limited(boom: Boom, path: Path, base: BaseMotion | None = None) -> tuple[TimeLaw, float]:
     """Return the law of ruckig, and the factor by which it is slowed.
 
-    One law s(t) for all joints, its limits the least of limit / |p'| over joints and path, slowed evenly where the path's
-    curvature or a drive asks for it.
+    One law s(t) for all joints, its limits the least of limit / |p'| over joints and path, slowed
+    evenly where the path's curvature or a drive asks for it.
 
     Raises:
         InfeasibleError: ruckig found no law; carries its result.

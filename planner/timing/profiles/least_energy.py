@@ -1,14 +1,15 @@
 """Law of least copper loss within a given duration, by a second-order cone program (Clarabel).
 
-The current of a motor follows its torque, so its loss is r T^2 with r = 2 R (I / T_run)^2. At the motor, without the
-gearbox's losses, T = (tau + J qdd) / N with the drive's own inertia J at the joint. Along the path this is linear in x = s'^2
-and u = s'': T = q(u, x). The loss of a move,
+The current of a motor follows its torque, so its loss is r T^2 with r = 2 R (I / T_run)^2. At the
+motor, without the gearbox's losses, T = (tau + J qdd) / N with the drive's own inertia J at the
+joint. Along the path this is linear in x = s'^2 and u = s'': T = q(u, x). The loss of a move,
 
     E = int sum_i r_i q_i(u, x)^2 / sqrt(x) ds,
 
-is convex, because q^2 / z is convex in (q, z) and falls with z, and sqrt(x) is concave. So is a duration of at most T,
-int ds / sqrt(x) <= T. A duration of at least T is not: where motors hold a load they lose power all the time, and the loss
-would be least if the arm hurried on and lingered where its load is lightest.
+is convex, because q^2 / z is convex in (q, z) and falls with z, and sqrt(x) is concave. So is a
+duration of at most T, int ds / sqrt(x) <= T. A duration of at least T is not: where motors hold a
+load they lose power all the time, and the loss would be least if the arm hurried on and lingered
+where its load is lightest.
 """
 
 from dataclasses import dataclass
@@ -37,7 +38,8 @@ _TOLERANCES = (1e-6, 1e-5)  # relative, tried in turn: x is small beside the end
 _LEAST = 1e-12  # [W]
 
 _Blocks = list[tuple[Any, Array]]
-"""Rows A and bounds b of A v <= b, or of cones b - A v. Sparse matrices are `Any`: their types differ between versions."""
+"""Rows A and bounds b of A v <= b, or of cones b - A v. Sparse matrices are `Any`: their types
+differ between versions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,8 @@ class Loss:
     s: Array
     """(n,) grid."""
     a: Array
-    """(2, n - 1, m) root of the loss per u, at the start and the end of each interval, for each motor [sqrt(W) s^2]."""
+    """(2, n - 1, m) root of the loss per u, at the start and the end of each interval, for each
+    motor [sqrt(W) s^2]."""
     b: Array
     """(2, n - 1, m) per x."""
     c: Array

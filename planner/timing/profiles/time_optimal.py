@@ -104,9 +104,10 @@ def _shape_cap(boom: Boom, path: Path, s: Array) -> Array:
 def _repaired(demands: PathDynamics, found: "_Found", unit: float) -> TimeLaw:
     """Return the law of a solve, slower where a limit is exceeded inside a step.
 
-    Where a joint turns back p' is 0 and p'' may jump: there the speed that both ends of a step allow can be too much between
-    them, however short the step. It is capped at both ends, and solved for again; of all these laws that is taken which is
-    the shortest once it is slowed by what it still breaks.
+    Where a joint turns back p' is 0 and p'' may jump: there the speed that both ends of a step
+    allow can be too much between them, however short the step. It is capped at both ends, and
+    solved for again; of all these laws that is taken which is the shortest once it is slowed by
+    what it still breaks.
     """
     laws: list[tuple[float, TimeLaw]] = []
     for _ in range(_REPAIRS):
@@ -235,8 +236,9 @@ def _solve(condition: "_Condition", path: Path, s: Array) -> Array | None:
 
     s' is in the unit of time of the condition.
 
-    Backwards from rest the largest x from which rest can be reached, then forwards as fast as these allow. toppra's own loop
-    also asks for the least such x; here it is 0, because the load can be held at rest everywhere.
+    Backwards from rest the largest x from which rest can be reached, then forwards as fast as these
+    allow. toppra's own loop also asks for the least such x; here it is 0, because the load can be
+    held at rest everywhere.
     """
     solver = seidelWrapper([condition], _ToppraPath(path), s)
     steps, top, x = solver.get_deltas(), [0.0] * len(s), [0.0] * len(s)
@@ -273,7 +275,8 @@ class _Condition(LinearConstraint):  # type: ignore[misc]
         x_max = np.minimum(self._x_max * self._square, toppra.constants.MAXX)
         x_bound = np.stack([np.zeros_like(x_max), x_max], axis=-1)
         F, g = np.eye(a.shape[1]), np.ones(a.shape[1])
-        # The helper hands its sixth and seventh argument back in their places: the bounds on u and on x.
+        # The helper hands its sixth and seventh argument back in their places: the bounds on u and
+        # on x.
         return canlinear_colloc_to_interpolate(
             a / self._square, b / self._square, c, F, g, None, x_bound, gridpoints, identical=True
         )

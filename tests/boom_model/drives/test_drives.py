@@ -65,7 +65,8 @@ def test_reflected_inertia_is_14_75():
 
 
 def test_drive_inertia_is_the_share_of_it_that_passes_the_gearbox():
-    # 0.65 x 14.7456 kg m^2: what the motor spends on itself while driving would lose 35 % on its way to the joint
+    # 0.65 x 14.7456 kg m^2: what the motor spends on itself while driving would lose 35 % on its
+    # way to the joint
     assert drive_inertia(DRIVE) == pytest.approx(0.65 * 25600 * 5.76e-4, rel=4e-16, abs=0)
     assert drive_inertia(without("gearbox", "efficiency")) == reflected_inertia(DRIVE)
 

@@ -30,7 +30,8 @@ from tests.oracles import (
     virtual_work,
 )
 
-# Rounding, joint by joint; the wrist's small torque comes of a short arm between points far from frame 1.
+# Rounding, joint by joint; the wrist's small torque comes of a short arm between points far from
+# frame 1.
 MUJOCO = [5e-15, 5e-15, 5e-15, 5e-15, 4e-14]
 PINOCCHIO = [5e-15, 5e-15, 5e-15, 5e-15, 1e-14]
 EMPTY = [2e-15, 2e-15, 5e-15, 4e-15, 1e-13]
@@ -329,8 +330,8 @@ def test_pin_forces_lie_in_the_plane_of_the_arm(boom):
         assert (getattr(pins, pin)[:, 1] == 0).all()
 
 
-# Thesis, table 2-8, the MATLAB columns of joints 2 to 5; joint 1 as virtual work and MuJoCo have it, because the thesis
-# has a wrong base moment there.
+# Thesis, table 2-8, the MATLAB columns of joints 2 to 5; joint 1 as virtual work and MuJoCo have
+# it, because the thesis has a wrong base moment there.
 TABLE_2_8 = np.array(
     [
         [0.2288, 0.527, 73.563, 0.235, 0.001],

@@ -136,7 +136,7 @@ def test_velocity_torque_is_quadratic_in_the_velocity(boom):
 
 
 def test_velocity_torque_is_that_of_lagrange(boom):
-    """dM/dt qd - d(qd . M qd / 2)/dq: it does the work that changing inertia takes, and no other."""
+    """It is dM/dt qd - d(qd . M qd / 2)/dq, the work of changing inertia, and no other."""
     q, qd, _ = states(boom, 50, 11)
     M_rate = derivative(lambda s: mass_matrix(boom, q + s * qd), h=3e-3)
     slopes = [derivative(lambda s, d=d: kinetic_energy(boom, q + s * d, qd), h=3e-3) for d in np.eye(5)]

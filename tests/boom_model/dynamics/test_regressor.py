@@ -53,7 +53,8 @@ def through_the_loop(boom: Boom, states: tuple[Array, Array, Array], base: BaseM
     for q, qd, qdd, now in zip(*states, instants(base, len(states[0])), strict=True):
         x, xd, xdd = G @ q, G @ qd, G @ qdd
         if base is not None:
-            # Any rotation with this `up`; a free-flyer's linear rate is the spatial acceleration a - w x v.
+            # Any rotation with this `up`; a free-flyer's linear rate is the spatial acceleration a
+            # - w x v.
             R = pinocchio.Quaternion.FromTwoVectors(now.up, np.array([0.0, 0.0, 1.0])).toRotationMatrix()
             x = np.concatenate([pinocchio.SE3ToXYZQUAT(pinocchio.SE3(R, np.zeros(3))), x])
             root = now.acceleration - np.cross(now.angular_velocity, now.velocity)

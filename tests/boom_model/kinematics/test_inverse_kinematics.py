@@ -206,10 +206,12 @@ def on_this_side(found: Branches, yaw: float) -> Array:
 TANGENT = pytest.mark.parametrize(
     ("constraint", "q", "outward"),
     [
-        # The inner link stands across the actuator: it would take a longer one to reach further that way.
+        # The inner link stands across the actuator: it would take a longer one to reach further
+        # that way.
         pytest.param(ActuatorHorizontal(), (0.7, np.pi / 2, np.pi, 0.3, 0.0), np.pi / 2, id="actuator held"),
         pytest.param(ActuatorAngle(-0.6), (0.7, np.pi / 2 - 0.6, np.pi - 0.6, 0.3, 0.6), np.pi / 2 - 0.6, id="tilted"),
-        # The inner link and the line from pin 8 to the wrist are one straight line: the arm is stretched.
+        # The inner link and the line from pin 8 to the wrist are one straight line: the arm is
+        # stretched.
         pytest.param(
             FixedExtension(0.25),
             (0.7, 0.02, 0.02 + np.pi - np.arctan2(GEOMETRY.L6, GEOMETRY.L7 + 0.25), 0.25, 0.0),
@@ -397,8 +399,8 @@ def test_the_best_branch_is_nearest_to_the_reference(reference, best):
     assert separation(found.solutions[found.best].q, best) < 1e-14
 
 
-# Shares of the ranges from their middle: of the shorter way 20/120 and 0.5 - extension, of the longer way 40/120 and
-# 0.153 - extension.
+# Shares of the ranges from their middle: of the shorter way 20/120 and 0.5 - extension, of the
+# longer way 40/120 and 0.153 - extension.
 @pytest.mark.parametrize(("extension", "best"), [(0.0, 1), (0.1, 1), (0.25, 0), (0.3, 0)])
 def test_without_a_reference_the_best_branch_is_nearest_to_the_middle(extension, best):
     ways = two_ways(extension)

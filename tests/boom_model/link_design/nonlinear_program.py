@@ -1,7 +1,8 @@
 """A link's least mass as one nonlinear program of heights and internal forces, by CasADi and IPOPT.
 
-It shares nothing with the product's method: no frozen forces, prices or cones. It takes the conventions
-of the beam: lumps at the stations, the trapezoid rule, deflection by moment area and shear.
+It shares nothing with the product's method: no frozen forces, prices or cones. It takes the
+conventions of the beam: lumps at the stations, the trapezoid rule, deflection by moment area and
+shear.
 """
 
 import casadi as ca

@@ -85,7 +85,10 @@ def test_random_problems_are_feasible_and_near_their_bound(seed):
 
 
 def geometric_mean(G):
-    """sqrt((G_1 . H) (G_2 . H)) >= 1 as a column of one element with the matrix (G_1 . H, -1; -1, G_2 . H)."""
+    """Return sqrt((G_1 . H) (G_2 . H)) >= 1 as a column of one element.
+
+    Its matrix is (G_1 . H, -1; -1, G_2 . H).
+    """
     n = G.shape[1]
     bending, axial = np.zeros((10, n)), np.zeros((10, n))
     bending[[2, 9]], axial[7] = G, 1.0 / n
