@@ -7,14 +7,14 @@ from typing import Any
 
 import tomlkit
 
-from boom_model import JOINTS, Boom, InputError, Sourced
+from boom_model import JOINTS, Basis, Boom, InputError, Origin, Sourced
 from boom_model.boom import IS_LENGTH
 from boom_model.boom_file import BOOM_FILE
 from boom_model.toml_file import editable_toml
 from planner.motion.trajectory import write_csv
 from planner.page.drives import NONE
 from planner.page.plans import BOOM_TOML, VEHICLE_TOML, Planned, command_line
-from planner.page.state import State
+from planner.page.state import LIMITS, State, written_limits
 from planner.page.vehicle import LEVEL_SLOPE, slope_file
 
 
@@ -22,9 +22,9 @@ def files_of(state: State) -> dict[str, str]:
     """Return the name of each file that can be saved now, by kind."""
     names = {"recording": "move.rrd", "csv": "move.csv", "report": "move.html"} if state.planned is not None else {}
     names["mission"] = "mission-page.toml"
-    if state.swapped:
+    if state.has_own_boom:
         names["boom"] = BOOM_TOML
-    if state.slope != LEVEL_SLOPE:
+    if state.move.vehicle is None and state.slope != LEVEL_SLOPE:
         names["vehicle"] = VEHICLE_TOML
     return names
 
@@ -59,7 +59,7 @@ def command(state: State) -> str:
         payload=None if mass == state.original.payload.mass else mass,
         boom_file=state.boom_file,
         catalogue_file=state.catalogue_file,
-        swapped=bool(state.swapped),
+        changed=state.has_own_boom,
     )
 
 
@@ -78,6 +78,7 @@ def mission_file(state: State) -> str:
     given: Mapping[str, Any] = {
         "via": list(words.via),
         "along": words.along if words.along != "joint" else "",
+        "pass_via": words.pass_via,
         "duration_s": words.duration,
         "jerk_bound": words.jerk_bound,
         "average_torque": words.average_torque,
@@ -92,7 +93,7 @@ def mission_file(state: State) -> str:
 
 
 def boom_file(state: State) -> str:
-    """Return the boom's file with the drives of the page; all else, comments too, as it was.
+    """Return the boom's file with the drives and limits of the page; all else, comments too, as it was.
 
     Raises:
         InputError: the file cannot be read any more.
@@ -106,7 +107,16 @@ def boom_file(state: State) -> str:
             table[key].update(_models(state.boom, joint))
         else:
             table[key] = _models(state.boom, joint) | _supply(state.boom, joint)
+    for joint, name in state.raised:
+        document["joints"][joint].update(_limit(state.boom, joint, name))
     return tomlkit.dumps(document)
+
+
+def _limit(boom: Boom, joint: str, name: str) -> dict[str, Any]:
+    """Return a limit with its key of the boom's file."""
+    i, power = JOINTS.index(joint), ("", "2", "3")[LIMITS.index(name)]
+    value = Sourced(written_limits(boom, name)[i], Origin(Basis.ASSUMED, "a fix of the page"))
+    return {f"{name}_{'m' if IS_LENGTH[i] else 'deg'}_s{power}": _sourced(value)}
 
 
 def _models(boom: Boom, joint: str) -> dict[str, Any]:

@@ -10,15 +10,23 @@ import viser
 from boom_model import JOINTS
 from boom_model.boom import IS_LENGTH
 from boom_model.kinematics.constraints import WORDS
+from planner.motion.vehicle import named_cases
 from planner.page.drives import offered
 from planner.page.html import complaint
-from planner.page.state import FLAGS, State, drive_field
+from planner.page.state import State, drive_field
+from planner.page.vehicle import OWN
 from planner.timing.profile import PROFILES
 
 _WIDTH = 340  # [px] of each panel: 600 px of 1280 are left for the scene
 _NARROW = 1000  # [px] of a window that has no room for a panel on either side
 SAVED = ("recording", "csv", "report", "mission", "boom", "vehicle")
 """Kinds of files, as `downloads.files_of` has them."""
+
+_FLAGS = (
+    ("pass_via", "pass via without a stop", "On a smooth path; otherwise the move stops at each"),
+    ("jerk_bound", "jerk limits too", "Of the time-optimal profile"),
+    ("average_torque", "average torque too", "Of the time-optimal profile"),
+)
 
 Edit = Callable[[str, str], None]
 """Takes a field's name and its new text."""
@@ -155,6 +163,7 @@ def _pose(panels: Panels, state: State) -> None:
     panels.text("payload", "payload [kg]", state.asked["payload"], "Mass at the tip")
     panels.text("roll", "roll [deg]", "0", "Tilt of the vehicle about its forward axis, left side up")
     panels.text("nose", "nose down [deg]", "0", "Tilt of the vehicle about its left axis")
+    panels.choice("vehicle", "vehicle", (OWN, *named_cases()), OWN, "A case's track and shock act on a planned move alone")
 
 
 def _target(panels: Panels, state: State) -> None:
@@ -172,15 +181,15 @@ def _target(panels: Panels, state: State) -> None:
 
 def _move(panels: Panels, state: State) -> None:
     panels.text("start", "start", state.asked["start"], "A pose's name, q=... or tip=X,Y,Z")
-    panels.text("via", "via", "", "Targets on the way, with semicolons between them; the move stops there")
+    panels.text("via", "via", "", "Targets on the way, with semicolons between them")
     panels.text("goal", "goal", state.asked["goal"], "A pose's name, q=... or tip=X,Y,Z")
     panels.group("take", "this pose is", ("start", "via", "goal"), "Take the pose that the sliders have")
     panels.choice("profile", "profile", tuple(map(str, PROFILES)), "cubic", "How the path is timed")
     panels.text("along", "along", "joint", "joint, line or arc=X,Y,Z")
     panels.text("duration", "duration [s]", "", "Nothing: the shortest that the limits allow")
-    labels = ("jerk limits too", "average torque too")
-    for name, label in zip(FLAGS, labels, strict=True):
-        panels.flag(name, label, "Of the time-optimal profile")
+    panels.text("rate", "rate [Hz]", "", "Rate of a controller, on whose clock samples and stops lie")
+    for name, label, hint in _FLAGS:
+        panels.flag(name, label, hint)
     panels.button("plan", "Plan")
     panels.group("work", "then", ("look for fixes", "stop"), "Single changes that make the move possible; stop slow work")
     panels.place("planning")

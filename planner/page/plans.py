@@ -14,8 +14,8 @@ from planner.planning import Move, plan_move
 from planner.recording.torque_speed import Plane, planes
 
 BOOM_TOML, VEHICLE_TOML = "boom-page.toml", "vehicle-page.toml"
-"""Names of the files that a command needs beside it, if the page changed the drives or tilted the
-vehicle."""
+"""Names of the files that a command needs beside it, if the page changed drives or limits, or tilted
+the vehicle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +51,13 @@ def text_of(value: float) -> str:
 
 
 def spec_of(words: MoveWords, slope: Slope) -> MoveSpec:
-    """Return the move of the page's words on its slope.
+    """Return the move of the page's words, on its slope unless they name a vehicle case.
 
     Raises:
         InputError: as `MoveWords.spec`.
     """
-    return replace(words.spec(), vehicle=slope.case)
+    spec = words.spec()
+    return spec if words.vehicle is not None else replace(spec, vehicle=slope.case)
 
 
 def make_plan(boom: Boom, words: MoveWords, slope: Slope) -> Planned:
@@ -76,17 +77,17 @@ def command_line(
     payload: float | None = None,
     boom_file: str | None = None,
     catalogue_file: str | None = None,
-    swapped: bool = False,
+    changed: bool = False,
 ) -> str:
     """Return the `boom plan` command that gives the page's plan.
 
     Args:
         words: the move.
-        slope: of the vehicle; another than level needs VEHICLE_TOML.
+        slope: of the vehicle; another than level or that of a named case needs VEHICLE_TOML.
         payload: at the tip [kg]; None is that of the boom's file.
         boom_file: the boom's file that the page was started with.
         catalogue_file: the catalogue that the page was started with.
-        swapped: whether drives were swapped; they need BOOM_TOML.
+        changed: whether drives or limits were changed; they need BOOM_TOML.
     """
     parts = ["boom", "plan", words.start, words.goal]
     tips = any(isinstance(target, TipTarget) for target in words.spec().targets)
@@ -104,9 +105,9 @@ def command_line(
             parts += [option, text_of(value) if isinstance(value, float) else value]
     if payload is not None:
         parts += ["--payload", text_of(payload)]
-    if slope != LEVEL_SLOPE:
+    if words.vehicle is None and slope != LEVEL_SLOPE:
         parts += ["--vehicle", VEHICLE_TOML]
-    source = BOOM_TOML if swapped else boom_file
+    source = BOOM_TOML if changed else boom_file
     for option, name in (("--boom", source), ("--catalogue", catalogue_file)):
         if name is not None:
             parts += [option, name]

@@ -24,24 +24,27 @@ from boom_model import (
     inverse_kinematics,
     nearest_reachable,
 )
-from boom_model.arrays import Array
+from boom_model.arrays import Array, read_only
 from boom_model.boom import IS_LENGTH, in_degrees
 from boom_model.kinematics.constraints import parse_constraint
-from boom_model.plausible import DURATION, MASS, SLOPE
+from boom_model.plausible import DURATION, MASS, RATE, SLOPE
 from boom_model.words import joint_position, number
 from planner.move_spec import MoveWords
 from planner.page.drives import fitted, supplies_of, with_drive
 from planner.page.plans import Planned, text_of
-from planner.page.vehicle import LEVEL_SLOPE, Slope
+from planner.page.vehicle import LEVEL_SLOPE, OWN, Slope, slope_of
 from planner.page.workspace import Workspace
 from planner.paths.targets import TipTarget, parse_pitch, parse_target
 from planner.suggestions import Suggestion
 
 TARGET = ("x", "y", "z", "pitch", "constraint")
 """Fields of the tip target."""
-MOVE = ("start", "via", "goal", "profile", "along", "duration", "jerk_bound", "average_torque")
-"""Fields of a move. `via` holds targets with semicolons; the last two hold "yes" or nothing."""
-FLAGS = ("jerk_bound", "average_torque")
+FLAGS = ("pass_via", "jerk_bound", "average_torque")
+"""Fields that hold "yes" or nothing."""
+MOVE = ("start", "via", "goal", "profile", "along", "duration", "rate", *FLAGS)
+"""Fields of a move. `via` holds targets with semicolons."""
+LIMITS = ("velocity", "acceleration", "jerk")
+"""Limits of a joint that a suggestion may raise."""
 
 
 def drive_field(joint: str) -> str:
@@ -118,6 +121,19 @@ class State:
     complaints: Mapping[str, str] = field(default_factory=dict)
 
     @property
+    def raised(self) -> tuple[tuple[str, str], ...]:
+        """Joints and names of the limits that the page has raised."""
+        was, now = self.original.limits, self.boom.limits
+        return tuple(
+            (joint, name) for i, joint in enumerate(JOINTS) for name in LIMITS if getattr(was, name)[i] != getattr(now, name)[i]
+        )
+
+    @property
+    def has_own_boom(self) -> bool:
+        """Whether a command needs a file of the page's boom."""
+        return bool(self.swapped or self.raised)
+
+    @property
     def q(self) -> Array:
         """Joint position (5,) of the sliders [rad, m]."""
         return joint_position("pose", words_of(self.joints))
@@ -161,10 +177,11 @@ def first_state(
         "payload": text_of(state.boom.payload.mass),
         "roll": "0",
         "nose": "0",
+        "vehicle": OWN,
         "pitch": "down",
         "constraint": "horizontal",
     }
-    asked |= {"start": poses[0], "goal": poses[-1], "via": "", "profile": "cubic", "along": "joint", "duration": ""}
+    asked |= {"start": poses[0], "goal": poses[-1], "via": "", "profile": "cubic", "along": "joint", "duration": "", "rate": ""}
     return edited(replace(state, asked=asked | dict.fromkeys(FLAGS, "")), "pose", poses[-1])
 
 
@@ -310,9 +327,21 @@ def _slope(name: str) -> Callable[[State, str], State]:
     def put(state: State, text: str) -> State:
         value = number(name, text, "a number of degrees")
         SLOPE.require(name, value)
-        return _without_plan(replace(_clear(state, name), slope=replace(state.slope, **{name: value})))
+        asked = {**state.asked, "vehicle": OWN}
+        move, slope = replace(state.move, vehicle=None), replace(state.slope, **{name: value})
+        return _without_plan(replace(_clear(state, name), asked=asked, move=move, slope=slope))
 
     return put
+
+
+def _vehicle(state: State, text: str) -> State:
+    """Take a named case with its slope; the slope stays where the case is left again."""
+    if text == OWN:
+        return _without_plan(replace(_clear(state, "vehicle"), move=replace(state.move, vehicle=None)))
+    slope = slope_of(text)
+    asked = {**state.asked, "roll": text_of(slope.roll), "nose": text_of(slope.nose)}
+    state = replace(_clear(state, "vehicle", "roll", "nose"), asked=asked, slope=slope)
+    return _without_plan(replace(state, move=replace(state.move, vehicle=text)))
 
 
 def _drive(joint: str) -> Callable[[State, str], State]:
@@ -349,6 +378,8 @@ def _with_words(state: State) -> State:
     words = _words(state)
     if words.duration is not None:
         DURATION.require("duration", words.duration)
+    if words.rate is not None:
+        RATE.require("rate", words.rate)
     for target in words.spec().targets:
         if isinstance(target, str):
             state.boom.pose(target)
@@ -357,7 +388,7 @@ def _with_words(state: State) -> State:
 
 def _words(state: State) -> MoveWords:
     asked = state.asked
-    duration = asked["duration"].strip()
+    duration, rate = asked["duration"].strip(), asked["rate"].strip()
     return MoveWords(
         start=asked["start"].strip(),
         goal=asked["goal"].strip(),
@@ -365,8 +396,11 @@ def _words(state: State) -> MoveWords:
         profile=asked["profile"],
         along=asked["along"],
         duration=number("duration", duration, "a number of seconds") if duration else None,
+        rate=number("rate", rate, "a number of Hz") if rate else None,
+        pass_via=bool(asked["pass_via"]),
         jerk_bound=bool(asked["jerk_bound"]),
         average_torque=bool(asked["average_torque"]),
+        vehicle=state.move.vehicle,
         pitch=state.target.pitch,
         constraint=state.target.constraint,
     )
@@ -408,7 +442,25 @@ def with_suggestion(state: State, suggestion: Suggestion) -> State:
     if suggestion.change == "order":
         between = [f"q={words_of(_rounded(np.asarray(target, dtype=float)))}" for target in spec.via]
         return edited(state, "via", "; ".join([*filter(None, [words["via"]]), *between]))
+    if suggestion.change == "limit":
+        return changed_boom(state, _with_written_limits(suggestion.boom))
     return replace(changed_boom(state, suggestion.boom), unwritten=(*state.unwritten, suggestion.sentence))
+
+
+def written_limits(boom: Boom, name: str) -> tuple[float, ...]:
+    """Return the limits of a name in degrees and metres, as the page writes them."""
+    return _rounded(getattr(boom.limits, name))
+
+
+def _with_written_limits(boom: Boom) -> Boom:
+    """Return the boom with the limits that its file will have, so that both plan the same to the last digit."""
+
+    def read(name: str) -> Array:
+        texts = np.array(written_limits(boom, name))
+        return read_only(np.where(IS_LENGTH, texts, np.radians(texts)))
+
+    velocity, acceleration, jerk = map(read, LIMITS)
+    return replace(boom, limits=replace(boom.limits, velocity=velocity, acceleration=acceleration, jerk=jerk))
 
 
 _SETTERS: dict[str, Callable[[State, str], State]] = {
@@ -417,6 +469,7 @@ _SETTERS: dict[str, Callable[[State, str], State]] = {
     **{name: _joint(name) for name in JOINTS},
     **{drive_field(name): _drive(name) for name in JOINTS},
     **{name: _slope(name) for name in ("roll", "nose")},
+    "vehicle": _vehicle,
     **{name: _target(name) for name in TARGET},
     **{name: _move(name) for name in MOVE},
 }

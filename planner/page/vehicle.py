@@ -1,13 +1,16 @@
-"""Slope of the vehicle as the page sets it."""
+"""Slope of the vehicle as the page sets it, or as a named vehicle case has it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from boom_model import BaseMotion, Basis, Origin
-from planner.motion.vehicle import LEVEL, VehicleCase
+from planner.motion.vehicle import LEVEL, VehicleCase, load_case
 
 _SOURCE = "set on the page"
+_DIGITS = 9  # of an angle in degrees, far below what a slope is known to
+OWN = "as tilted"
+"""Choice of no named vehicle case: the vehicle rests on the slope of roll and nose."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,17 @@ class Slope:
 
 
 LEVEL_SLOPE = Slope()
+
+
+def slope_of(name: str) -> Slope:
+    """Return the slope of a named vehicle case, without its track and shock.
+
+    Raises:
+        InputError: the case is unknown.
+    """
+    case = load_case(name)
+    roll, nose = (round(float(np.degrees(angle)), _DIGITS) for angle in (case.roll, case.pitch))
+    return Slope(roll, nose)
 
 
 def slope_file(slope: Slope) -> str:

@@ -3,6 +3,7 @@
 With PICTURES set to a folder, the pictures of the guide are written there.
 """
 
+import json
 import os
 import re
 import shlex
@@ -22,6 +23,8 @@ pytestmark = pytest.mark.browser
 
 _ALONE = "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1"  # no name is resolved: the page has no internet
 _OPTIONS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars")
+
+NETWORK_LOG = "network.json"
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +46,7 @@ class Browser:
         assert driver is not None, "chromedriver is missing: apt-get install chromium-driver"
         options = webdriver.ChromeOptions()
         options.binary_location = chromium
-        for option in (*_OPTIONS, _ALONE):
+        for option in (*_OPTIONS, _ALONE, f"--log-net-log={folder / NETWORK_LOG}"):
             options.add_argument(option)
         options.add_experimental_option("prefs", {"download.default_directory": str(folder)})
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
@@ -131,6 +134,14 @@ def browser(page, tmp_path):
     opened.driver.quit()
 
 
+def requests_of_pages(log: Path) -> set[str]:
+    """Addresses that a page or its workers asked for, as Chromium's network log has them; not the browser's own."""
+    whole = json.loads(log.read_text())
+    begun = whole["constants"]["logEventTypes"]["URL_REQUEST_START_JOB"]
+    asked = [event["params"] for event in whole["events"] if event["type"] == begun and "params" in event]
+    return {each["url"] for each in asked if each.get("initiator", "").startswith("http")}
+
+
 def session(page):
     """The session of the newest tab."""
     return page.sessions[max(page.sessions)]
@@ -210,21 +221,21 @@ def test_a_weaker_drive_fails_and_a_suggestion_is_a_button(page, browser):
     assert session(page).state.boom.payload.mass < 15.0
 
 
-def test_nothing_is_asked_of_another_address(page, browser):
-    import json
-
-    browser.tab("Move")
-    browser.press("Plan")
-    browser.until(lambda: session(page).state.planned)
-    asked = []
-    for entry in browser.driver.get_log("performance"):
-        message = json.loads(entry["message"])["message"]
-        if message["method"] == "Network.requestWillBeSent":
-            asked.append(message["params"]["request"]["url"])
-    assert page.address + "/" in asked
-    served = re.compile(r"http://127\.0\.0\.1:\d+/|data:|blob:")
-    assert [url for url in asked if not served.match(url)] == []
-    assert [entry for entry in browser.driver.get_log("browser") if entry["level"] == "SEVERE"] == []
+def test_nothing_is_asked_of_another_address(page, tmp_path):
+    opened = Browser(page.address, tmp_path)
+    try:
+        opened.tab("Move")
+        opened.press("Plan")
+        opened.until(lambda: session(page).state.planned)
+        messages = [json.loads(entry["message"])["message"] for entry in opened.driver.get_log("performance")]
+        asked = [each["params"]["request"]["url"] for each in messages if each["method"] == "Network.requestWillBeSent"]
+        assert page.address + "/" in asked
+        served = re.compile(r"http://127\.0\.0\.1:\d+/|data:|blob:")
+        assert [url for url in asked if not served.match(url)] == []
+        assert [entry for entry in opened.driver.get_log("browser") if entry["level"] == "SEVERE"] == []
+    finally:
+        opened.driver.quit()  # it ends the log of the network, which has what the page's workers ask for too
+    assert requests_of_pages(tmp_path / NETWORK_LOG) == {page.address.replace("http", "ws") + "/"}
 
 
 def test_it_works_on_a_tablet(page, tmp_path):

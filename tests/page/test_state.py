@@ -26,7 +26,7 @@ from planner.page.state import (
     with_plan,
     with_suggestion,
 )
-from planner.page.vehicle import LEVEL_SLOPE
+from planner.page.vehicle import LEVEL_SLOPE, OWN, Slope
 from planner.suggestions import suggestions
 from tests.builders import with_running_torque
 
@@ -76,6 +76,8 @@ def test_the_joints_are_the_fields_in_degrees_and_metres(first):
         ("start", "q=1,nan,3,4,5", "must be finite"),
         ("goal", "home", "unknown pose"),
         ("duration", "-2", "between 0.001 and 1e+07 s"),
+        ("rate", "nan", "must be finite"),
+        ("vehicle", "slpoe", "did you mean slope"),
         ("along", "circle", "unknown along"),
         ("jerk_bound", "yes", "is for the time-optimal profile"),
         ("drive_inner", "BIG", "unknown drive"),
@@ -169,6 +171,30 @@ def test_the_slope_is_the_vehicle_case_that_its_file_describes(first, tmp_path):
     assert load_case(str(file)) == state.slope.case
 
 
+def test_a_named_case_tilts_the_page_and_typing_a_tilt_leaves_it(first):
+    state = put(first, vehicle="ditch")
+    assert (state.asked["roll"], state.move.vehicle, state.slope.roll) == ("5", "ditch", 5.0)
+    assert spec_of(state.move, state.slope).vehicle == load_case("ditch")
+    assert "vehicle" not in downloads.files_of(state)
+    typed = put(state, nose="2")
+    assert (typed.asked["vehicle"], typed.move.vehicle, typed.slope) == (OWN, None, Slope(5.0, 2.0))
+    assert put(state, vehicle=OWN).slope == state.slope
+
+
+def test_raised_limits_are_in_the_boom_that_a_command_reads(first, boom, tmp_path):
+    short = put(first, duration="4.9")
+    raised = [each for each in suggestions(short.boom, spec_of(short.move, short.slope)) if each.change == "limit"]
+    state = with_suggestion(short, raised[0])
+    assert state.raised
+    assert not state.unwritten
+    for kind, name in downloads.files_of(state).items():
+        (tmp_path / name).write_bytes(downloads.content(state, kind))
+    code, _, error = boom(*shlex.split(downloads.command(state))[1:], "--csv", "shell.csv")
+    assert code == 0, error
+    state = with_plan(state, make_plan(state.boom, state.move, state.slope))
+    assert (tmp_path / "shell.csv").read_bytes() == downloads.content(state, "csv")
+
+
 def test_the_mission_moves_as_the_plan(first, tmp_path):
     state = put(first, goal="tip=1.4,0,1.0", constraint="extension=0.25", profile="time-optimal", jerk_bound="yes")
     file = tmp_path / "mission-page.toml"
@@ -187,6 +213,8 @@ def test_the_mission_moves_as_the_plan(first, tmp_path):
         {},
         {"payload": "8", "goal": "tip=1.4,0,1.0", "constraint": "extension=0.25", "profile": "time-optimal"},
         {"via": "q=40,60,120,0.3,0; q=60,60,150,0.5,0", "profile": "quintic", "duration": "12.5", "roll": "5"},
+        {"via": "q=40,60,120,0.3,0", "pass_via": "yes", "rate": "250", "vehicle": "ditch", "profile": "jerk-limited"},
+        {"vehicle": "slope", "roll": "3", "profile": "time-optimal"},
         {"start": "tip=1,1.7,0.9", "goal": "tip=-1,1.7,0.9", "along": "line", "pitch": "-85", "drive_lower": SMALL},
     ],
 )
@@ -217,9 +245,9 @@ def test_each_suggestion_makes_the_move_possible():
 def test_a_thousand_random_events_leave_a_state_within_the_limits(first):
     rng = np.random.default_rng(20261124)
     numbers = "nan inf -1e9 0 1 0.5 45 90 180 1e4"
-    others = "down free level horizontal extension=0.3 transport tip=1.4,0,1 q=0,60,180,0.2,0 q=1,2 time-optimal cubic line yes"
+    others = "down free level horizontal extension=0.3 transport tip=1.4,0,1 q=0,60,180,0.2,0 q=1,2 time-optimal line yes track"
     words = ["", SMALL, "none", *numbers.split(), *others.split()]
-    names = [*JOINTS, "pose", "payload", "roll", "nose", *TARGET, *MOVE, *map(drive_field, JOINTS)]
+    names = [*JOINTS, "pose", "payload", "roll", "nose", "vehicle", *TARGET, *MOVE, *map(drive_field, JOINTS)]
     state, accepted = first, 0
     for _ in range(1000):
         name = names[rng.integers(len(names))]
