@@ -9,8 +9,8 @@ TYPE_CHECKING = False  # as in `typing`; a type checker takes it for True
 if TYPE_CHECKING:
     from planner.checks.rows import Verdict as Verdict
     from planner.experiments.comparison import compare as compare
-    from planner.links.design import LinkTask as LinkTask
     from planner.links.design import design_link as design_link
+    from planner.links.task import LinkTask as LinkTask
     from planner.missions.mission import check_cycle as check_cycle
     from planner.missions.mission import load_mission as load_mission
     from planner.missions.mission import plan_cycle as plan_cycle
@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "planner.checks.rows": ("Verdict",),
     "planner.experiments.comparison": ("compare",),
-    "planner.links.design": ("LinkTask", "design_link"),
+    "planner.links.design": ("design_link",),
+    "planner.links.task": ("LinkTask",),
     "planner.missions.mission": ("check_cycle", "load_mission", "plan_cycle"),
     "planner.motion.motion_files": ("read_motion", "write_motion"),
     "planner.motion.trajectory": ("Trajectory",),

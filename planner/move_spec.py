@@ -5,8 +5,7 @@ made from the fields of `MoveWords`, so a new option is described once.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +13,10 @@ from numpy.typing import ArrayLike
 from boom_model import InputError
 from boom_model.arrays import scalar
 from boom_model.kinematics.constraints import CONSTRAINTS, Constraint, parse_constraint
-from boom_model.plausible import DURATION, RATE, Range
+from boom_model.plausible import DURATION, RATE
 from planner.motion.trajectory import STEP, check_size
 from planner.motion.vehicle import LEVEL, VehicleCase, load_case
+from planner.option_field import option_field
 from planner.paths.legs import Along
 from planner.paths.targets import Target, parse_along, parse_joint_velocity, parse_pitch, parse_target
 from planner.timing.profile import PROFILES, Cubic, TimingProfile, parse_profile
@@ -127,49 +127,35 @@ class MoveSpec:
 
 
 @dataclass(frozen=True)
-class Word:
-    """Help text, form, choices and bounds of a field of `MoveWords`."""
-
-    help: str
-    form: str | None = None
-    choices: tuple[str, ...] = ()
-    quantity: Range | None = None
-
-
-def _word(
-    default: Any, help: str, form: str | None = None, *, choices: tuple[str, ...] = (), quantity: Range | None = None
-) -> Any:
-    return field(default=default, metadata={"word": Word(help, form, choices, quantity)})
-
-
-@dataclass(frozen=True)
 class MoveWords:
     """Description of a move in words: the options of the command and the keys of a mission."""
 
     start: str
     goal: str
-    profile: str = _word("cubic", "How the path is timed.", choices=tuple(map(str, PROFILES)))
-    via: tuple[str, ...] = _word((), "Target on the way, with a stop there; may be repeated.", "TARGET")
-    pass_via: bool = _word(False, "Pass the targets on the way on a smooth path, without a stop.")
-    via_velocity: tuple[str, ...] = _word(
+    profile: str = option_field("cubic", "How the path is timed.", choices=tuple(map(str, PROFILES)))
+    via: tuple[str, ...] = option_field((), "Target on the way, with a stop there; may be repeated.", "TARGET")
+    pass_via: bool = option_field(False, "Pass the targets on the way on a smooth path, without a stop.")
+    via_velocity: tuple[str, ...] = option_field(
         (),
         "Velocity of the cubic at each --via in order, without a stop. Default: continuous acceleration.",
         "DEG/S,DEG/S,DEG/S,M/S,DEG/S",
     )
-    along: str = _word(
+    along: str = option_field(
         "joint",
         "Kind of path: straight in the joints, a line between tip targets, or an arc of the tip through a point.",
         "joint|line|arc=X,Y,Z",
     )
-    duration: float | None = _word(None, "Duration. Default: the shortest that the limits allow.", "S", quantity=DURATION)
-    jerk_bound: bool = _word(False, "Keep the jerk limits as well (time-optimal profile).")
-    average_torque: bool = _word(False, "Keep the gearboxes' average torque as well (time-optimal profile).")
-    rate: float | None = _word(None, "Rate of a controller; samples and stops lie on its clock.", "HZ", quantity=RATE)
-    pitch: str = _word(
+    duration: float | None = option_field(
+        None, "Duration. Default: the shortest that the limits allow.", "S", quantity=DURATION
+    )
+    jerk_bound: bool = option_field(False, "Keep the jerk limits as well (time-optimal profile).")
+    average_torque: bool = option_field(False, "Keep the gearboxes' average torque as well (time-optimal profile).")
+    rate: float | None = option_field(None, "Rate of a controller; samples and stops lie on its clock.", "HZ", quantity=RATE)
+    pitch: str = option_field(
         "down", "Elevation of the end effector at a tip target; free: the constraint chooses it.", "down|level|up|free|DEG"
     )
-    constraint: str = _word("horizontal", f"Extra constraint of a tip target: {CONSTRAINTS}.", "CONSTRAINT")
-    vehicle: str | None = _word(
+    constraint: str = option_field("horizontal", f"Extra constraint of a tip target: {CONSTRAINTS}.", "CONSTRAINT")
+    vehicle: str | None = option_field(
         None, "Vehicle case: slope, track, shock, ditch or a FILE.toml. Default: at rest on level ground.", "CASE"
     )
 

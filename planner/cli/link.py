@@ -1,17 +1,17 @@
 """The command that designs a link."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from boom_model import Boom, InfeasibleError, InputError
-from planner.cli.completion import OneOf, OutFile
+from planner.cli.completion import OutFile
 from planner.cli.options import (
     all_option,
     boom_option,
+    described_option,
     given_catalogue,
     json_option,
     load_boom,
@@ -22,94 +22,28 @@ from planner.cli.options import (
     with_names,
 )
 from planner.cli.printing import print_files, print_json, print_lines, print_rows, tracked
+from planner.links.task import OPTIONS, LinkTask
 from planner.paths.targets import parse_target
 
 if TYPE_CHECKING:
     from planner.files import Outputs
-    from planner.links.design import LinkDesign, LinkTask
+    from planner.links.design import LinkDesign
     from planner.motion.trajectory import Trajectory
 
 _Command = Callable[..., Any]
-
-
-_TASK_OPTIONS: tuple[Callable[[_Command], _Command], ...] = (
-    click.option(
-        "--link", "name", default="inner", show_default=True, metavar="inner|lower|outer|extension", help="Link to design."
-    ),
-    click.option(
-        "--links", type=click.Path(), metavar="FILE.toml", help="File of plates and fittings; default: the shipped one."
-    ),
-    click.option(
-        "--load",
-        type=OneOf(["moves", "thesis"]),
-        metavar="moves|thesis",
-        default="moves",
-        show_default=True,
-        help="moves: every sample of the moves. thesis: the load case of the thesis.",
-    ),
-    click.option(
-        "--method",
-        type=OneOf(["exact", "thesis"]),
-        metavar="exact|thesis",
-        default="exact",
-        show_default=True,
-        help="exact: least mass by optimality conditions. thesis: two-stage search of the thesis.",
-    ),
-    click.option(
-        "--largest-components",
-        is_flag=True,
-        help="Combine the largest value of each load component in one case, as in the thesis.",
-    ),
-    payload_as_option,
-    click.option(
-        "--material",
-        default="steel",
-        show_default=True,
-        metavar="steel|aluminium|cfrp",
-        help="Material; the data of cfrp are assumed.",
-    ),
-    click.option("--thickness", type=float, metavar="M", help="Thickness of one plate; default: that of the link."),
-    click.option(
-        "--safety-factor", type=float, default=2.0, show_default=True, help="Safety factor against yield and buckling."
-    ),
-    click.option("--deflection", type=float, default=0.01, show_default=True, metavar="M", help="Largest deflection."),
-    click.option(
-        "--min-height", type=float, default=0.0, show_default=True, metavar="M", help="Smallest height of the plates."
-    ),
-    click.option("--max-height", type=float, metavar="M", help="Largest height of the plates; default: no limit."),
-    click.option("--max-taper", type=float, metavar="RATIO", help="Largest change of height per length; default: no limit."),
-    click.option(
-        "--frozen",
-        is_flag=True,
-        help="Exact method: keep the moments of the first stage, as in the thesis, and leave out shear.",
-    ),
-    click.option(
-        "--shear/--no-shear",
-        default=None,
-        help="Exact method: include shear in the deflection. Default: yes for --load moves, no for thesis.",
-    ),
-    click.option("--no-buckling", is_flag=True, help="Exact method: leave out the buckling constraint."),
-    click.option("--slices", type=int, default=1000, show_default=True, help="Number of slices along the link."),
-    click.option(
-        "--step", type=float, default=1e-4, show_default=True, metavar="M", help="Thesis method: height step delta-H."
-    ),
-)
-"""Options for the fields of `LinkTask`, some of them negated."""
 
 
 def task_options(command: _Command) -> _Command:
     """Add the options of a `LinkTask` to a command, which receives them as `task`."""
 
     @wraps(command)
-    def run(name: str, frozen: bool, no_buckling: bool, **given: Any) -> Any:
-        from planner.links.design import LinkTask
+    def run(**given: Any) -> Any:
+        task = LinkTask(payload_as=given.pop("payload_as"), **{name: given.pop(name) for name in OPTIONS})
+        return command(task=task, **given)
 
-        own = {field.name: given.pop(field.name) for field in fields(LinkTask) if field.name in given}
-        return command(task=LinkTask(link=name, own_mass=not frozen, buckling=not no_buckling, **own), **given)
-
-    decorated: _Command = run
-    for option in reversed(_TASK_OPTIONS):
-        decorated = option(decorated)
+    decorated: _Command = payload_as_option(run)
+    for name, option in reversed(OPTIONS.items()):
+        decorated = described_option(name, option, getattr(LinkTask, name))(decorated)
     return decorated
 
 

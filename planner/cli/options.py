@@ -1,7 +1,7 @@
 """Options that several commands share, and the objects that they name."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import MISSING, fields
+from dataclasses import MISSING
 from functools import wraps
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,8 @@ from boom_model import Boom, InputError
 from boom_model.plausible import Range
 from planner.cli.completion import OneOf, constraints, targets, vehicles
 from planner.cli.printing import REPLACED
-from planner.move_spec import MoveSpec, MoveWords, Word
+from planner.move_spec import MoveSpec, MoveWords
+from planner.option_field import OptionField, options_of
 from planner.paths.targets import TipTarget
 
 if TYPE_CHECKING:
@@ -36,33 +37,54 @@ def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any]
     return within
 
 
-_WORDS = {field.name: field for field in fields(MoveWords) if "word" in field.metadata}
+_WORDS = options_of(MoveWords)
 _COMPLETE = {"via": targets, "constraint": constraints, "vehicle": vehicles}
 
 
 def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -> Callable[[_Command], _Command]:
-    """Return the option of a field of `MoveWords`, made from the description of the field.
+    """Return the option of a field of `MoveWords`.
 
     Args:
         name: the field.
         default: replaces the default of the field.
         help: replaces the help text of the field.
     """
-    field = _WORDS[name]
-    word: Word = field.metadata["word"]
-    standard = field.default if default is MISSING else default
-    kinds: dict[str, Any] = {"default": standard, "help": help or word.help, "shell_complete": _COMPLETE.get(name)}
-    if isinstance(field.default, bool):
-        kinds |= {"is_flag": True}
-    elif isinstance(field.default, tuple):
-        kinds |= {"multiple": True, "metavar": word.form}
-    elif word.quantity is not None:
-        kinds |= {"type": float, "callback": plausible(word.quantity), "metavar": word.form}
-    elif word.choices:
-        kinds |= {"type": OneOf(word.choices), "show_default": True, "metavar": "|".join(word.choices)}
+    standard = getattr(MoveWords, name) if default is MISSING else default
+    return described_option(name, _WORDS[name], standard, help=help, shell_complete=_COMPLETE.get(name))
+
+
+def described_option(
+    name: str, option: OptionField, default: Any, *, help: str | None = None, shell_complete: Any = None
+) -> Callable[[_Command], _Command]:
+    """Return the option of a field, made from its description.
+
+    Args:
+        name: the field.
+        option: its description.
+        default: of the field.
+        help: replaces the help text.
+        shell_complete: completes the option's value.
+    """
+    flag = option.flag or f"--{name.replace('_', '-')}"
+    kinds: dict[str, Any] = {"default": default, "help": help or option.help, "shell_complete": shell_complete}
+    if isinstance(default, bool) or option.flag is not None:
+        kinds |= {"is_flag": True} | ({"flag_value": False} if option.negates else {})
+    elif isinstance(default, tuple):
+        kinds |= {"multiple": True, "metavar": option.form}
+    elif option.choices:
+        kinds |= {
+            "default": str(default),
+            "type": OneOf(option.choices),
+            "show_default": True,
+            "metavar": "|".join(option.choices),
+        }
+    elif option.quantity is not None:
+        kinds |= {"type": float, "callback": plausible(option.quantity)}
+        kinds |= {"metavar": option.form, "show_default": default is not None}
     else:
-        kinds |= {"metavar": word.form, "show_default": standard is not None}
-    return click.option(f"--{name.replace('_', '-')}", **kinds)
+        kinds |= {"type": int if isinstance(default, int) else None}
+        kinds |= {"metavar": option.form, "show_default": default is not None}
+    return click.option(flag, name, **kinds)
 
 
 def move_options(*left_out: str) -> Callable[[_Command], _Command]:

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from boom_model import JOINTS, Body, Boom, InputError, inverse_dynamics, transmission_angle
-from boom_model.arrays import Array, read_only, scalar
+from boom_model.arrays import Array, read_only
 from boom_model.drives.catalogue import Catalogue
 from boom_model.drives.drive import Drive
 from boom_model.dynamics.newton_euler import PayloadAs
@@ -35,11 +35,11 @@ from boom_model.link_design.exact import buckling_load
 from boom_model.link_design.finite_elements import Solution, solve_beam, solve_plate
 from boom_model.link_design.search import pressed
 from boom_model.link_design.thesis_method import ThesisDesign, ThesisLoad
-from boom_model.plausible import DEFLECTION, HEIGHT, HEIGHT_STEP, SAFETY_FACTOR, TAPER, THICKNESS
 from boom_model.words import unknown
 from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Verdict
 from planner.links.loads import largest_components, link_cases, thesis_load
+from planner.links.task import LinkTask, LoadFrom, Method
 from planner.motion.trajectory import Trajectory
 from planner.move_spec import MoveSpec
 from planner.planning import check, plan_each_profile, plan_motion
@@ -49,99 +49,6 @@ E = TypeVar("E", bound=StrEnum)
 
 DRIVEN_BY = {"inner": 1, "lower": 2, "outer": 1, "extension": 2}
 """Joint whose torque depends most on the mass of a link."""
-
-
-class LoadFrom(StrEnum):
-    """Source of the loads of a link."""
-
-    THESIS = "thesis"
-    MOVES = "moves"
-
-
-class Method(StrEnum):
-    """Method that finds the heights of the plates."""
-
-    THESIS = "thesis"
-    EXACT = "exact"
-
-
-_PLAUSIBLE = {
-    "safety_factor": SAFETY_FACTOR,
-    "deflection": DEFLECTION,
-    "step": HEIGHT_STEP,
-    "min_height": HEIGHT,
-    "max_height": HEIGHT,
-    "max_taper": TAPER,
-    "thickness": THICKNESS,
-}
-
-
-@dataclass(frozen=True)
-class LinkTask:
-    """Requirements on a link."""
-
-    link: str = "inner"
-    load: str = LoadFrom.MOVES
-    method: str = Method.EXACT
-    material: str = "steel"
-    safety_factor: float = 2.0
-    """Yield stress / stress limit, and smallest buckling load / largest end load."""
-    deflection: float = 0.01
-    """Largest deflection [m]."""
-    slices: int = 1000
-    step: float = 1e-4
-    """delta-H of the thesis's method [m]."""
-    min_height: float = 0.0
-    max_height: float | None = None
-    max_taper: float | None = None
-    thickness: float | None = None
-    """Thickness of one plate [m]; None is that of the link."""
-    own_mass: bool = True
-    """See `least_mass`."""
-    shear: bool | None = None
-    """Whether the deflection of the exact method includes shear; None means yes for the loads of
-    moves, and no for the load of the thesis."""
-    buckling: bool = True
-    """Whether the exact method has a buckling constraint."""
-    largest_components: bool = False
-    """Whether to combine the largest load components, instead of one case per instant."""
-    payload_as: PayloadAs = "mass"
-    links: str | None = None
-    """TOML file of plates and fittings; None is the shipped one."""
-
-    def __post_init__(self) -> None:
-        by_thesis = self.method == Method.THESIS
-        pointless = {
-            "frozen moments leave out shear: choose one of them": not self.own_mass and self.shear is True,
-            "the thesis's method always freezes the moments": by_thesis and not self.own_mass,
-            "the thesis's method leaves out shear; use the exact method": by_thesis and self.shear is not None,
-            "the thesis's method has no buckling constraint to leave out": by_thesis and not self.buckling,
-            "the thesis's method always takes the largest components": by_thesis and self.largest_components,
-            "the thesis's load is a single case: it has no largest components": self.load == LoadFrom.THESIS
-            and self.largest_components,
-        }
-        for reason, asked in pointless.items():
-            if asked:
-                raise InputError(reason)
-        for name, quantity in _PLAUSIBLE.items():
-            value = getattr(self, name)
-            if value is not None:
-                quantity.require(name.replace("_", " "), scalar(name.replace("_", " "), value))
-
-    def sized(self, link: Link) -> Link:
-        """Return the link with plates of the task's thickness; unchanged if it gives none."""
-        return link if self.thickness is None else replace(link, width=self.thickness * link.plates)
-
-    def limits(self, material: Material) -> Limits:
-        """Return what a design must respect in a material."""
-        return Limits(
-            stress=material.yield_stress / self.safety_factor,
-            deflection=self.deflection,
-            min_height=self.min_height,
-            max_height=self.max_height,
-            max_taper=self.max_taper,
-            buckling_factor=self.safety_factor if self.buckling else None,
-        )
 
 
 @dataclass(frozen=True)

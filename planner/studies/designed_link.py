@@ -4,8 +4,8 @@ from boom_model import Boom, InputError
 from boom_model.link_design import LINKS, Material, least_mass, link_body, with_body
 from boom_model.link_design.link import link_of
 from boom_model.words import unknown
-from planner.links.design import LinkTask
 from planner.links.loads import link_cases
+from planner.links.task import LinkTask
 from planner.missions.mission import Cycle
 from planner.studies.tables import Tree
 

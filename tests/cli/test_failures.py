@@ -207,7 +207,7 @@ def test_a_toml_file_beyond_reason(boom, tmp_path, text, said):
         ((*PLAN, "--constraint", "extension=1e308"), "constraint extension is 1e+308"),
         (("link", "--load", "thesis", "--deflection", "1e-300"), "deflection is 1e-300 m; it must be between 1e-06 and 1 m"),
         (("link", "--load", "thesis", "--method", "thesis", "--step", "1e-300"), "step is 1e-300 m"),
-        (("link", "--load", "thesis", "--safety-factor", "1e308"), "safety factor is 1e+308"),
+        (("link", "--load", "thesis", "--safety-factor", "1e308"), "safety-factor is 1e+308"),
         (("size", "table-3-1", "--voltage", "1e308"), "1e+308 V"),
         (("control", *PLAN[1:], "--bandwidth", "1e308"), "bandwidth is 1e+308 Hz"),
         (("control", *PLAN[1:], "--payload-error", "1e308"), "payload-error is 1e+308 kg"),

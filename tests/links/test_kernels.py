@@ -14,7 +14,8 @@ DESIGN = """
 import json
 from dataclasses import replace
 from boom_model import Boom, Catalogue
-from planner.links.design import LinkTask, default_moves, design_link
+from planner.links.design import default_moves, design_link
+from planner.links.task import LinkTask
 
 boom, found = Boom.load(), []
 no_motors = replace(Catalogue.load(), motors={})

@@ -16,10 +16,11 @@ from boom_model.link_design.link import LINKS_FILE
 from boom_model.link_design.thesis_method import THESIS_LOAD
 from planner import plan
 from planner.links.convergence import study
-from planner.links.design import LinkTask, default_moves, design_link
+from planner.links.design import default_moves, design_link
 from planner.links.files import COLUMNS, write_boom, write_contour, write_outline, write_stations
 from planner.links.picture import write_link_picture
 from planner.links.report import to_json, to_markdown
+from planner.links.task import LinkTask
 from planner.recording import write_link_recording
 from planner.validation.tables import table_3_1_motion
 from tests.recordings import recorded_entities
@@ -199,7 +200,7 @@ def test_the_command_for_people_and_its_moves(boom):
         (("--deflection", "0"), 2, "deflection is 0 m; it must be between 1e-06 and 1 m"),
         (("--min-height", "0.2", "--max-height", "0.1"), 2, "minimum height 0.2 m is not below the maximum of 0.1 m"),
         (("--slices", "1"), 2, "slices is 1; it must be a whole number of at least 2"),
-        (("--safety-factor", "nan"), 2, "safety factor is nan"),
+        (("--safety-factor", "nan"), 2, "safety-factor is nan"),
         (("--max-height", "0.01"), 1, "the stress needs"),
         (("--link", "wrist"), 2, "unknown link 'wrist'"),
         (("--material", "wood"), 2, "unknown material 'wood'"),

@@ -12,7 +12,8 @@ from boom_model.boom_file import BOOM_FILE
 from boom_model.link_design.link import LINKS_FILE
 from boom_model.toml_file import parse_toml
 from planner.checks.rows import SAMPLING_SLACK
-from planner.links.design import LinkTask, design_link
+from planner.links.design import design_link
+from planner.links.task import LinkTask
 from planner.missions.mission import check_cycle, load_mission, mission_file, plan_cycle
 from planner.reports.answer import usage
 from planner.studies.designed_link import link_task, with_designed_link
