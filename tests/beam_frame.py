@@ -1,9 +1,11 @@
-"""Finite elements of the arm's plane: inner link and extension as beams, everything else rigid, motors and slides held.
+"""Finite elements of the arm's plane: inner link and extension as beams, everything else rigid,
+motors and slides held.
 
-An independent model of the lowest modes: Euler-Bernoulli beams with distributed mass (a density quadratic along the beam, with
-the body's mass, centre and inertia), where `planner.control.plant` has one
-torsional spring for each. Coordinates are the beams' nodes (deflection and slope) and the lower link's angle; a point's
-displacement is linear in them, and the energies follow from those of the bodies and the beams.
+An independent model of the lowest modes: Euler-Bernoulli beams with distributed mass (a density
+quadratic along the beam, with the body's mass, centre and inertia), where `planner.control.plant`
+has one torsional spring for each. Coordinates are the beams' nodes (deflection and slope) and the
+lower link's angle; a point's displacement is linear in them, and the energies follow from those of
+the bodies and the beams.
 """
 
 import numpy as np
@@ -46,7 +48,8 @@ def frequencies(boom: Boom, q: Array, stiffness: Array, inner_EI: float, extensi
         M[:] += mass * shift.T @ shift
 
     def rigid(name: str, e: Array, p: Array, place: Array, moves: Array, angle: Array) -> None:
-        """A body whose frame's origin is at `place` and moves by `moves` (2, size), turning by `angle` (size,)."""
+        """A body whose frame's origin is at `place` and moves by `moves` (2, size), turning by
+        `angle` (size,)."""
         body = {**boom.bodies, "payload": boom.payload}[name]
         com = R_LINK_BODY[name] @ body.com
         point(body.mass, moves + np.outer(_across(com[0] * e + com[1] * p), angle))
@@ -98,7 +101,8 @@ def frequencies(boom: Boom, q: Array, stiffness: Array, inner_EI: float, extensi
 
 
 def _density(body: Body, length: float, axis: int, sign: float) -> Polynomial:
-    """kg/m along a rod from 0 to `length`, quadratic, with the body's mass, centre and inertia across that axis."""
+    """kg/m along a rod from 0 to `length`, quadratic, with the body's mass, centre and inertia
+    across that axis."""
     center, inertia = sign * body.com[axis], body.inertia[1, 1] + body.mass * body.com[axis] ** 2
     moments = [[length ** (i + j + 1) / (i + j + 1) for j in range(3)] for i in range(3)]
     return Polynomial(np.linalg.solve(moments, [body.mass, body.mass * center, inertia]))

@@ -1,4 +1,5 @@
-"""Booms, moves, missions, drives and shapes that several test files need; nothing is planned before it is asked for."""
+"""Booms, moves, missions, drives and shapes that several test files need; nothing is planned before
+it is asked for."""
 
 import os
 from collections.abc import Iterable
@@ -62,7 +63,8 @@ ROUND_POST = np.array([np.radians(10), 0.5, 2.6, 0.3, 0.0]), np.array([np.radian
 
 @cache
 def main_move(profile: str = "cubic", step: float = STEP) -> Move:
-    """The shipped boom's move from transport to phenotyping, planned once for all tests that only look at it."""
+    """The shipped boom's move from transport to phenotyping, planned once for all tests that only
+    look at it."""
     return plan(Boom.load(), "transport", "phenotyping", profile=profile, step=step)
 
 
@@ -142,7 +144,8 @@ def joint_view(
     static: ArrayLike | None = None,
     coulomb: float = 0.0,
 ) -> JointView:
-    """Joint 2 of a motion whose torque, speed and acceleration are given sample by sample, or constant."""
+    """Joint 2 of a motion whose torque, speed and acceleration are given sample by sample, or
+    constant."""
     t = np.array([0.0, 1.0]) if t is None else np.asarray(t, dtype=float)
     tau, qd, qdd = (np.broadcast_to(np.asarray(x, dtype=float), t.shape) for x in (tau, qd, qdd))
     rates = np.zeros((2, t.size, 5))
@@ -178,7 +181,8 @@ def row_of(report: Report, joint: str, check: str) -> Row:
 
 
 def plant_energy(plant: Plant, x: Array) -> Array:
-    """Kinetic, potential and elastic energy [J] (...) at states x = (q, qd, theta, theta') (..., 14) of an elastic boom."""
+    """Kinetic, potential and elastic energy [J] (...) at states x = (q, qd, theta, theta') (...,
+    14) of an elastic boom."""
     elastic = list(plant.elastic)
     q, qd, theta, theta_d = x[..., :5], x[..., 5:10], x[..., 10:12], x[..., 12:]
     links = kinetic_energy(plant.boom, q, qd) + potential_energy(plant.boom, q)

@@ -1,7 +1,8 @@
-"""What a motion asks of the third-generation boom's limits, from the datasheets' own figures: what tests hold the planner to.
+"""What a motion asks of the third-generation boom's limits, from the datasheets' own figures: what
+tests hold the planner to.
 
-It shares the rigid-body dynamics with the planner (held against MuJoCo and Pinocchio elsewhere) and nothing else: neither the
-drives' curves nor the way a motion is sampled.
+It shares the rigid-body dynamics with the planner (held against MuJoCo and Pinocchio elsewhere) and
+nothing else: neither the drives' curves nor the way a motion is sampled.
 """
 
 import numpy as np

@@ -1,7 +1,9 @@
-"""The least time along a path by direct collocation, and a motion's worst ratios, both independent of planner and model.
+"""The least time along a path by direct collocation, and a motion's worst ratios, both independent
+of planner and model.
 
-The dynamics are Pinocchio's. The drives' limits are written out here, with the datasheets' figures of the MST342C02 on the
-CBG320160 that drive joints 2 and 3, wired in parallel at 80 V. The nonlinear program is IPOPT's.
+The dynamics are Pinocchio's. The drives' limits are written out here, with the datasheets' figures
+of the MST342C02 on the CBG320160 that drive joints 2 and 3, wired in parallel at 80 V. The
+nonlinear program is IPOPT's.
 """
 
 from typing import NamedTuple
@@ -39,7 +41,8 @@ class Optimum(NamedTuple):
 
 
 def torque_on_curve(speed):
-    """What the voltage leaves at joint speeds >= 0 [rad/s], at the joint [Nm]; of NumPy or of CasADi."""
+    """What the voltage leaves at joint speeds >= 0 [rad/s], at the joint [Nm]; of NumPy or of
+    CasADi."""
     w = RATIO * speed
     resistive = RESISTANCE * PEAK_CURRENT + RUNNING_TORQUE / PEAK_CURRENT * w
     reactive = POLE_PAIRS * w * INDUCTANCE * PEAK_CURRENT
@@ -48,10 +51,12 @@ def torque_on_curve(speed):
 
 
 def minimum_time(boom: Boom, path: Path, *, drives: bool = True, credit: bool = True, intervals: int = INTERVALS) -> Optimum:
-    """The least time along a path, rest to rest, on level ground, from a slow cubic as the first guess.
+    """The least time along a path, rest to rest, on level ground, from a slow cubic as the first
+    guess.
 
-    Direct collocation in time: states s and s', control s'' linear over each of `intervals` equal steps and integrated
-    exactly, limits held at every node. The path's coefficients are splines of degree 5 in s.
+    Direct collocation in time: states s and s', control s'' linear over each of `intervals` equal
+    steps and integrated exactly, limits held at every node. The path's coefficients are splines of
+    degree 5 in s.
 
     Args:
         drives: whether the drives' limits count.
@@ -98,7 +103,8 @@ def minimum_time(boom: Boom, path: Path, *, drives: bool = True, credit: bool = 
 
 
 def throughout(motion: Motion) -> tuple[Array, Array, Array]:
-    """q, qd, qdd (n, 5) at SAMPLES_PER_PIECE places of every piece of the motion's law, its ends from within included."""
+    """q, qd, qdd (n, 5) at SAMPLES_PER_PIECE places of every piece of the motion's law, its ends
+    from within included."""
     breaks = motion.law.s.x
     t = breaks[:-1, None] + np.diff(breaks)[:, None] * np.linspace(1e-6, 1.0 - 1e-6, SAMPLES_PER_PIECE)
     return motion(t.ravel())[:3]

@@ -1,9 +1,11 @@
-"""Independent models of the boom that tests hold `boom_model` against: MuJoCo, Pinocchio and the textbook recursion.
+"""Independent models of the boom that tests hold `boom_model` against: MuJoCo, Pinocchio and the
+textbook recursion.
 
-MuJoCo and Pinocchio get an open tree with a joint for every link of the linkage, rooted in a free body that is frame 1.
-The parallelogram makes the tree's coordinates linear in the boom's: x = G q, and so the closed linkage needs
-tau = G^T tau_tree. The textbook form takes the frames of the DH tables through eqs. 2.39-2.46 of the thesis (as
-corrected), one state at a time, and turns forces into torques by virtual work.
+MuJoCo and Pinocchio get an open tree with a joint for every link of the linkage, rooted in a free
+body that is frame 1. The parallelogram makes the tree's coordinates linear in the boom's: x = G q,
+and so the closed linkage needs tau = G^T tau_tree. The textbook form takes the frames of the DH
+tables through eqs. 2.39-2.46 of the thesis (as corrected), one state at a time, and turns forces
+into torques by virtual work.
 """
 
 from collections.abc import Callable, Mapping
@@ -64,7 +66,8 @@ class ComMotion(NamedTuple):
 
 
 def tree(boom: Boom) -> list[TreeLink]:
-    """The boom cut open at pin 7: base, then lower and outer, then inner and all that hangs on it, depth first."""
+    """The boom cut open at pin 7: base, then lower and outer, then inner and all that hangs on it,
+    depth first."""
     g = boom.geometry
     parallel, raised = ((1, 0, 0), (0, 1, 0)), ((1, 0, 0), (0, 0, 1))
     shoulder = (g.L2, 0.0, g.L1)
@@ -85,9 +88,11 @@ def tree_matrix(boom: Boom) -> Array:
 
 
 def mujoco_model(boom: Boom, *, payload_as: PayloadAs = "mass") -> mujoco.MjModel:
-    """The tree in MuJoCo, on a free root, with sites at the tip, the payload and either half of pin 7.
+    """The tree in MuJoCo, on a free root, with sites at the tip, the payload and either half of pin
+    7.
 
-    MuJoCo wants mass on a free root: it gets 1 kg and 1 kg m^2, which `mujoco_inverse_dynamics` takes off again.
+    MuJoCo wants mass on a free root: it gets 1 kg and 1 kg m^2, which `mujoco_inverse_dynamics`
+    takes off again.
     """
     g, payload = boom.geometry, boom.payload
     top = ElementTree.Element("mujoco")
@@ -265,7 +270,8 @@ def pinocchio_mass_matrix(boom: Boom, q: Array) -> Array:
 
 
 def pinocchio_energies(boom: Boom, q: Array, qd: Array, *, payload_as: PayloadAs = "mass") -> tuple[Array, Array]:
-    """Kinetic and potential energy [J], each (n,), of states (n, 5); a payload that is a force has no kinetic one."""
+    """Kinetic and potential energy [J], each (n,), of states (n, 5); a payload that is a force has
+    no kinetic one."""
     model = pinocchio_model(boom, payload_as=payload_as)
     data, place, rate = model.createData(), pinocchio.neutral(model), np.zeros(model.nv)
     energies = np.empty((len(q), 2))
@@ -282,7 +288,8 @@ def pinocchio_energies(boom: Boom, q: Array, qd: Array, *, payload_as: PayloadAs
 
 
 class TextbookFrame(NamedTuple):
-    """Motion of a frame, each (3,) along its own axes; `vd` holds gravity as an upward acceleration of frame 1."""
+    """Motion of a frame, each (3,) along its own axes; `vd` holds gravity as an upward acceleration
+    of frame 1."""
 
     w: Array
     wd: Array
@@ -341,7 +348,8 @@ def textbook_needs(
     tip_force: ArrayLike = (0.0, 0.0, 0.0),
     tip_moment: ArrayLike = (0.0, 0.0, 0.0),
 ) -> dict[str, Need]:
-    """What every body, the payload and the "tip" (what is not put on it) need in one state (5,), by eqs. 2.44-2.46."""
+    """What every body, the payload and the "tip" (what is not put on it) need in one state (5,), by
+    eqs. 2.44-2.46."""
     loops: tuple[Loop, Loop] = ("inner", "outer")
     motions = {loop: textbook_recursion(boom, q, qd, qdd, loop, base) for loop in loops}
     poses = _placed(boom, q)
@@ -410,7 +418,8 @@ BOOMS = {"third generation": Boom.load(), "generic": generic(Boom.load())}
 
 
 def random_states(boom: Boom, count: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """q, qd, qdd, each (count, 5): q within the limits, qd up to twice its limits, qdd up to 2 in SI."""
+    """q, qd, qdd, each (count, 5): q within the limits, qd up to twice its limits, qdd up to 2 in
+    SI."""
     limits = boom.limits
     q = rng.uniform(limits.lower, limits.upper, (count, 5))
     q[:, 2] = rng.uniform(q[:, 1] + limits.linkage, limits.upper[2])

@@ -1,6 +1,8 @@
-"""Seeded random plans: from moves of a nanoradian to moves across every range, on every kind of path.
+"""Seeded random plans: from moves of a nanoradian to moves across every range, on every kind of
+path.
 
-A plan is found again by its number alone. Every third one leads the tip under a constraint that chooses.
+A plan is found again by its number alone. Every third one leads the tip under a constraint that
+chooses.
 """
 
 from dataclasses import dataclass, field
@@ -118,7 +120,8 @@ def _poses(rng: Generator, count: int) -> list[Array]:
 
 
 def _on_a_curve(rng: Generator, chooses: bool) -> tuple[tuple[Target, ...], float, Constraint, Along]:
-    """Targets, pitch, constraint and line or arc: its ends are tips of poses with the pitch and the constraint."""
+    """Targets, pitch, constraint and line or arc: its ends are tips of poses with the pitch and the
+    constraint."""
     start = _pose(rng)
     fixed = int(rng.choice([2, 3]))  # the lower link or the extension
     poses = [start]

@@ -1,4 +1,5 @@
-"""Tests stand alone: what they share is in helpers, which are no tests, and nothing is planned to collect them."""
+"""Tests stand alone: what they share is in helpers, which are no tests, and nothing is planned to
+collect them."""
 
 import ast
 from collections.abc import Iterator
@@ -20,7 +21,8 @@ def imports(tree: ast.AST) -> Iterator[str]:
 
 
 def calls_at_import(node: ast.AST) -> Iterator[str]:
-    """Names of the functions that run when a file is imported: all but those in the bodies of functions."""
+    """Names of the functions that run when a file is imported: all but those in the bodies of
+    functions."""
     if isinstance(node, ast.Lambda):
         return
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):

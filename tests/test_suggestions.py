@@ -1,4 +1,5 @@
-"""Why a move cannot be made, and what would make it possible: each suggestion applied by hand, and a smaller one."""
+"""Why a move cannot be made, and what would make it possible: each suggestion applied by hand, and
+a smaller one."""
 
 import re
 from dataclasses import replace
@@ -77,7 +78,8 @@ def test_duration_that_mends_haste(profile):
 
 
 def test_limits_that_mend_haste_are_those_of_the_joints_that_hold_the_move_back():
-    """The cubic's least duration falls in proportion to the speed of the joint that decides, until the next one does."""
+    """The cubic's least duration falls in proportion to the speed of the joint that decides, until
+    the next one does."""
     least = plan(BOOM, *POSES).report.duration
     asked = least / 1.3
     found = by_kind(suggestions(BOOM, MoveSpec.of(*POSES, duration=asked)))
@@ -94,7 +96,8 @@ def test_limits_that_mend_haste_are_those_of_the_joints_that_hold_the_move_back(
 
 
 def test_an_order_that_mends_an_overload_really_does():
-    """Raising the arm while it runs out asks for more than either end does; raised first, it runs out upright."""
+    """Raising the arm while it runs out asks for more than either end does; raised first, it runs
+    out upright."""
     start, goal = np.array([0.2, 1.4, np.pi, 0.0, 0.0]), np.array([0.2, 1.4, 1.5, 1.0, 0.0])
     raised, run_out = goal.copy(), start.copy()
     raised[3], run_out[3] = start[3], goal[3]

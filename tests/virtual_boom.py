@@ -1,4 +1,5 @@
-"""A boom that only MuJoCo knows: bodies off by up to 10 %, friction, a loop closed by a constraint, and noisy sensors."""
+"""A boom that only MuJoCo knows: bodies off by up to 10 %, friction, a loop closed by a constraint,
+and noisy sensors."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -64,10 +65,11 @@ def perturbed(boom: Boom, rng: np.random.Generator) -> Boom:
 
 
 def experiment(nominal: Boom, truth: Boom, motion: Motion, duration: float, rng: np.random.Generator) -> Experiment:
-    """Run a motion on the true boom under a controller that knows the nominal one, and log it at 1 kHz.
+    """Run a motion on the true boom under a controller that knows the nominal one, and log it at 1
+    kHz.
 
-    The log holds the position at each step and the torque that acted from there on. MuJoCo's integrator makes the second
-    difference of the positions the acceleration under that torque.
+    The log holds the position at each step and the torque that acted from there on. MuJoCo's
+    integrator makes the second difference of the positions the acceleration under that torque.
     """
     model = mujoco.MjModel.from_xml_string(mjcf(truth))
     model.opt.timestep = h = STEP / _SUBSTEPS

@@ -14,8 +14,8 @@ from planner.planning import Move, plan_move
 from planner.recording.torque_speed import Plane, planes
 
 BOOM_TOML, VEHICLE_TOML = "boom-page.toml", "vehicle-page.toml"
-"""Names of the files that a command needs beside it, if the page changed drives or limits, or tilted
-the vehicle."""
+"""Names of the files that a command needs beside it, if the page changed drives or limits, or
+tilted the vehicle."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,5 @@
-"""Time of the whole command, against a process that only imports Rerun, which every recording needs."""
+"""Time of the whole command, against a process that only imports Rerun, which every recording
+needs."""
 
 import os
 import resource

@@ -1,7 +1,9 @@
-"""Time and memory of batched inverse dynamics, against Pinocchio and MuJoCo driving the same tree with the same loop map.
+"""Time and memory of batched inverse dynamics, against Pinocchio and MuJoCo driving the same tree
+with the same loop map.
 
-Run it alone for the numbers: `pytest tests/benchmarks -s`. Every method has one thread: BLAS is held to one, so that nothing
-gains by a second core. Where NumPy does not bring its own OpenBLAS, set OPENBLAS_NUM_THREADS=1 or its like.
+Run it alone for the numbers: `pytest tests/benchmarks -s`. Every method has one thread: BLAS is
+held to one, so that nothing gains by a second core. Where NumPy does not bring its own OpenBLAS,
+set OPENBLAS_NUM_THREADS=1 or its like.
 """
 
 import ctypes
@@ -113,7 +115,8 @@ def test_time(benchmark, count, method):
 
 
 def test_large_batch_takes_under_half_of_pinocchios_time():
-    """Torques alone take 0.23 to 0.31 of it, on a busy machine too; 0.33 to 0.43 with the reactions is too near to assert."""
+    """Torques alone take 0.23 to 0.31 of it, on a busy machine too; 0.33 to 0.43 with the reactions
+    is too near to assert."""
     count = COUNTS[-1]
     states = some_states(count)
     runs = {method: method(*(x[:LOOPED] if method in LOOPS else x for x in states)) for method in METHODS}
@@ -132,7 +135,8 @@ def test_large_batch_takes_under_half_of_pinocchios_time():
 
 
 def test_a_single_state_against_pinocchios_rnea():
-    """11 of `rnea` alone on the open tree, which is 1.5 us of C++; 3.3 of `rnea` with the loop map that closes the linkage."""
+    """11 of `rnea` alone on the open tree, which is 1.5 us of C++; 3.3 of `rnea` with the loop map
+    that closes the linkage."""
     q, qd, qdd = (x[0] for x in some_states(1))
     model, G = fixed_root(pinocchio_model(BOOM)), tree_matrix(BOOM)
     data, tree = model.createData(), [G @ x for x in (q, qd, qdd)]

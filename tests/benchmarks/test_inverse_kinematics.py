@@ -37,7 +37,8 @@ def targets(count: int) -> tuple[Array, Array]:
 
 
 def chain() -> Chain:
-    """The boom's rows with q = 0, in Craig's convention; joints without a limit of their own are open."""
+    """The boom's rows with q = 0, in Craig's convention; joints without a limit of their own are
+    open."""
     rows = dh_rows(BOOM, np.zeros(5), "inner")
     limits, right = BOOM.limits, np.pi / 2
     bounds = {i: (limits.lower[joint], limits.upper[joint]) for i, joint in ACTIVE.items()}

@@ -1,8 +1,10 @@
-"""Time of a link's least mass, exact and by the thesis's two stages, on the thesis's load case with 1000 slices.
+"""Time of a link's least mass, exact and by the thesis's two stages, on the thesis's load case with
+1000 slices.
 
-The peer of the exact method with own mass and shear is IPOPT on the same link as one nonlinear program. That of the others is
-Appendix D's own search, which looks at every slice for every step: 102,453 of them. A hundred of its steps are timed here,
-vectorised, and multiplied. Run it alone for the numbers: `pytest tests/benchmarks/test_link_design.py -s`.
+The peer of the exact method with own mass and shear is IPOPT on the same link as one nonlinear
+program. That of the others is Appendix D's own search, which looks at every slice for every step:
+102,453 of them. A hundred of its steps are timed here, vectorised, and multiplied. Run it alone for
+the numbers: `pytest tests/benchmarks/test_link_design.py -s`.
 """
 
 import time

@@ -1,7 +1,9 @@
-"""Ten minutes at 1 kHz through reading, check, recording and export: cost and memory grow as the samples do, and no faster.
+"""Ten minutes at 1 kHz through reading, check, recording and export: cost and memory grow as the
+samples do, and no faster.
 
-Each length runs in a process of its own, whose memory is the largest it ever had over what its imports take (VmHWM: the
-libraries' own allocations count). Figures are printed with `pytest tests/benchmarks -s`.
+Each length runs in a process of its own, whose memory is the largest it ever had over what its
+imports take (VmHWM: the libraries' own allocations count). Figures are printed with `pytest
+tests/benchmarks -s`.
 """
 
 import json

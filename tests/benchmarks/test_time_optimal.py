@@ -1,8 +1,10 @@
-"""Planning time of the time-optimal law under the drives' limits, against toppra called directly with Pinocchio's `rnea`.
+"""Planning time of the time-optimal law under the drives' limits, against toppra called directly
+with Pinocchio's `rnea`.
 
-Same path, same 500 steps, same discretisation. The peer's torques have constant limits, the motors' at standstill: what
-toppra holds in one solve. It breaks the motors' torque-speed curve wherever that counts, which the peak ratios show. Run it
-alone for the numbers: `pytest tests/benchmarks/test_time_optimal.py -s`.
+Same path, same 500 steps, same discretisation. The peer's torques have constant limits, the motors'
+at standstill: what toppra holds in one solve. It breaks the motors' torque-speed curve wherever
+that counts, which the peak ratios show. Run it alone for the numbers: `pytest
+tests/benchmarks/test_time_optimal.py -s`.
 """
 
 import logging
@@ -74,7 +76,8 @@ def ours(boom: Boom) -> Callable[[], Motion]:
 
 
 def peers(boom: Boom) -> Callable[[], object]:
-    """toppra on the tree without a free root, the drives' inertia added; joints without a drive get no limit to speak of."""
+    """toppra on the tree without a free root, the drives' inertia added; joints without a drive get
+    no limit to speak of."""
     model, G = fixed_root(pinocchio_model(boom)), tree_matrix(boom)
     data, rotors, torque = model.createData(), np.zeros(5), np.full(5, 1e6)
     rotors[DRIVEN], torque[DRIVEN] = INERTIA, AT_STANDSTILL

@@ -1,4 +1,5 @@
-"""The shipped boom and catalogue against the thesis's Appendices C and E, and what a user's own files may hold."""
+"""The shipped boom and catalogue against the thesis's Appendices C and E, and what a user's own
+files may hold."""
 
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError, fields

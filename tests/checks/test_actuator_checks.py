@@ -46,7 +46,8 @@ def test_every_row_by_hand():
 
 
 def test_mean_force_is_the_cube_mean_over_the_travel():
-    """600 N over 0.3 m, then 300 N over 0.1 m: ((0.3 x 600^3 + 0.1 x 300^3) / 0.4)^(1/3) = 552.6 N; the plain mean is 450 N."""
+    """600 N over 0.3 m, then 300 N over 0.1 m: ((0.3 x 600^3 + 0.1 x 300^3) / 0.4)^(1/3) = 552.6 N;
+    the plain mean is 450 N."""
     t = np.array([0.0, 1.0, 1.0 + 1e-9, 2.0])
     mean = row(rows_of([-600.0, -600.0, 300.0, 300.0], [0.3, 0.3, -0.1, -0.1], t=t), "actuator mean force")
     assert mean.demand == pytest.approx(168.75e6 ** (1 / 3), rel=1e-8)
@@ -87,7 +88,8 @@ def test_power_off_needs_a_brake(brake, verdict):
 
 
 def test_the_boom_with_an_actuator_is_checked_with_it():
-    """The rows replace those of a joint without a drive, and count the stroke from the joint's lower limit."""
+    """The rows replace those of a joint without a drive, and count the stroke from the joint's
+    lower limit."""
     boom = replace(Boom.load(), actuator=LinearDrive(SCREW, Sourced(True, SHEET)))
     q = np.tile(boom.pose("phenotyping"), (3, 1))
     still = Trajectory.from_samples([0.0, 1.0, 2.0], q, np.zeros((3, 5)), np.zeros((3, 5)))

@@ -1,4 +1,5 @@
-"""The certificate of a planned motion against a recomputation that shares nothing with it but the motion."""
+"""The certificate of a planned motion against a recomputation that shares nothing with it but the
+motion."""
 
 from dataclasses import replace
 

@@ -31,7 +31,8 @@ def test_average_torque_of_a_constant_is_the_constant():
 
 
 def test_average_torque_is_the_speed_weighted_cube_mean():
-    """100 Nm at 1 rad/s for 1 s and 50 Nm at 3 rad/s for 1 s: ((1e6 + 3 x 1.25e5) / 4)^(1/3) = 70.05 Nm."""
+    """100 Nm at 1 rad/s for 1 s and 50 Nm at 3 rad/s for 1 s: ((1e6 + 3 x 1.25e5) / 4)^(1/3) =
+    70.05 Nm."""
     t = np.array([0.0, 1.0, 1.0 + 1e-12, 2.0])
     torque, speed = np.array([100.0, 100.0, 50.0, 50.0]), np.array([1.0, 1.0, 3.0, 3.0])
     assert average_torque(t, torque, speed) == pytest.approx(((1e6 + 3 * 1.25e5) / 4) ** (1 / 3), rel=1e-9)
@@ -114,7 +115,8 @@ def test_more_torque_never_improves_a_verdict(path):
 
 
 def test_the_curve_gives_no_clean_pass_near_it():
-    """At the speed and torque where the margin is between 50 and 75 %: WARN; below: FAIL; and its basis is assumed."""
+    """At the speed and torque where the margin is between 50 and 75 %: WARN; below: FAIL; and its
+    basis is assumed."""
     verdicts = []
     for payload in (10.0, 20.0, 24.0):
         row = row_of(
@@ -250,7 +252,8 @@ def test_planned_moves_keep_the_motors_margin_with_friction(profile):
 
 
 def test_planned_moves_keep_the_gearboxs_start_stop_torque():
-    """A motor far stronger than its gearbox, and fast joints: the gearbox bears the joint's torque, the rotor's share not."""
+    """A motor far stronger than its gearbox, and fast joints: the gearbox bears the joint's torque,
+    the rotor's share not."""
     motor = replace(BOOM.drives[1].motor, running_torque=40.0, holding_torque=50.0)
     limits = replace(BOOM.limits, velocity=4.0 * BOOM.limits.velocity, acceleration=20.0 * BOOM.limits.acceleration)
     strong = replace(with_drives(BOOM, motor=motor), limits=limits).with_payload(22.0)
@@ -269,7 +272,8 @@ def test_a_low_voltage_is_seen_at_low_speed_too(path):
 
 
 def test_both_readings_of_the_efficiency_are_reported(path):
-    """At the mesh's 0.871 the largest of both directions asks 155.8 / (160 x 0.871) + 0.42 = 1.538 Nm and the inertia."""
+    """At the mesh's 0.871 the largest of both directions asks 155.8 / (160 x 0.871) + 0.42 = 1.538
+    Nm and the inertia."""
     row = row_of(check(BOOM, path, payload_as="force"), "inner", "motor torque, other reading")
     assert row.demand == pytest.approx(155.832 / (160 * 0.8713) + 0.42 + 5.76e-4 * 160 * np.radians(45) * 6 / 100, abs=2e-3)
     assert row.verdict is Verdict.INFO

@@ -60,7 +60,8 @@ def test_a_joint_that_rests_has_no_life_to_use_up():
 
 
 def test_average_speed_life_and_rms_count_pauses_and_average_torque_does_not():
-    """1 s at 1 rad/s under 80 Nm, then 3 s of pause: a quarter of the speed, four times the life, half the RMS torque."""
+    """1 s at 1 rad/s under 80 Nm, then 3 s of pause: a quarter of the speed, four times the life,
+    half the RMS torque."""
     t = np.array([0.0, 1.0, 1.0 + 1e-9, 4.0])
     tau, qd = np.array([80.0, 80.0, 80.0, 80.0]), np.array([1.0, 1.0, 0.0, 0.0])
     paused = replace(Duty.alone(t), powered=np.array([True, True, False, False]))
@@ -107,7 +108,8 @@ def test_a_shock_at_rest_counts_once():
 
 @pytest.mark.parametrize(("inertia", "verdict"), [(26.4, Verdict.PASS), (26.6, Verdict.WARN)])
 def test_resonance_by_hand(inertia, verdict):
-    """8 Hz on 67 kNm/rad is 67e3 / (2 pi 8)^2 = 26.52 kg m^2; a guide, so that it warns and does not fail."""
+    """8 Hz on 67 kNm/rad is 67e3 / (2 pi 8)^2 = 26.52 kg m^2; a guide, so that it warns and does
+    not fail."""
     found = row(gearbox_rows(joint_view(inertia=inertia), DRIVE, None), "gearbox resonance")
     assert found.limit == pytest.approx(8.0 * np.sqrt(26.517 / inertia), rel=1e-4)
     assert (found.demand, found.verdict) == (8.0, verdict)
@@ -220,7 +222,8 @@ def test_inertia_ratio_by_hand(inertia, verdict):
 
 
 def test_full_step_resonance_by_hand():
-    """50 x 9.0 Nm on 5.76e-4 kg m^2: sqrt(781250) = 883.9 rad/s, 140.7 Hz; that many steps of 1.8 deg are 42.2 rpm."""
+    """50 x 9.0 Nm on 5.76e-4 kg m^2: sqrt(781250) = 883.9 rad/s, 140.7 Hz; that many steps of 1.8
+    deg are 42.2 rpm."""
     assert full_step_resonance(DRIVE) == pytest.approx(140.67, abs=5e-3)
     assert full_step_resonance(DRIVE) * MOTOR.step / RPM == pytest.approx(42.2, abs=0.05)
     assert full_step_resonance(replace(DRIVE, motor=replace(MOTOR, holding_torque=None))) is None
@@ -265,7 +268,8 @@ def test_overload_without_a_figure_is_not_checkable(part, figure):
 
 
 def test_a_warning_on_the_curve_is_not_hidden_by_a_sample_off_it():
-    """On the curve 60 % to spare, an estimate's warning; off it, at 60 rpm, 55 %, a pass: the row warns."""
+    """On the curve 60 % to spare, an estimate's warning; off it, at 60 rpm, 55 %, a pass: the row
+    warns."""
     fast, slow = 1500 * RPM / 160, 60 * RPM / 160
     curve = row(motor_rows(joint_view(tau=10.0, qd=fast), DRIVE), "motor torque").limit
     joint = [(available / (1.0 + spare) - 0.42) * 160 * 0.65 for available, spare in ((7.2, 0.55), (curve, 0.60))]
@@ -275,7 +279,8 @@ def test_a_warning_on_the_curve_is_not_hidden_by_a_sample_off_it():
 
 
 def test_90_degrees_in_2_seconds():
-    """45 deg/s on average are 160 x 45 / 6 = 1200 rpm, a cubic's peak is half as much again; 1000 rpm are 37.5 deg/s."""
+    """45 deg/s on average are 160 x 45 / 6 = 1200 rpm, a cubic's peak is half as much again; 1000
+    rpm are 37.5 deg/s."""
     t = np.linspace(0.0, 2.0, 2001)
     rows = list(gearbox_rows(joint_view(tau=50.0, qd=np.radians(90.0) * (6 * t / 4 - 6 * t**2 / 8), t=t), DRIVE, None))
     assert row(rows, "gearbox average input speed").demand / RPM == pytest.approx(1200.0, rel=1e-6)

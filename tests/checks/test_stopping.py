@@ -79,8 +79,8 @@ def test_stop_of_a_trapezoid_on_one_joint_takes_v_over_a(share):
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.3, 0.5, 0.7])
 def test_stop_of_a_jerk_limited_move_on_one_joint_is_the_closed_form(share):
-    """From v and a: the deceleration rises to a peak p at the jerk limit, is held at the limit if it comes there, and falls
-    again, so that v + a^2/(2j) = p^2/j without a hold, in (a + 2 p)/j."""
+    """From v and a: the deceleration rises to a peak p at the jerk limit, is held at the limit if
+    it comes there, and falls again, so that v + a^2/(2j) = p^2/j without a hold, in (a + 2 p)/j."""
     motion = motion_of(BARE, JointLine(*SINGLE), "jerk-limited")
     at = share * motion.duration
     _, qd, qdd, _ = motion(at)

@@ -1,4 +1,5 @@
-"""How the command ends where something fails: one line on standard error, an exit code, and no file left behind."""
+"""How the command ends where something fails: one line on standard error, an exit code, and no file
+left behind."""
 
 import os
 import random

@@ -1,4 +1,5 @@
-"""Forty plausible mistakes: what was typed, and the one line that comes back; it names what to type instead."""
+"""Forty plausible mistakes: what was typed, and the one line that comes back; it names what to type
+instead."""
 
 import numpy as np
 import pytest
@@ -70,7 +71,8 @@ MISTAKES = [
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Files that people hand in: a motion as it should be, in other units, and a boom with a misspelt motor."""
+    """Files that people hand in: a motion as it should be, in other units, and a boom with a
+    misspelt motor."""
     place = tmp_path_factory.mktemp("mistakes")
     boom = Boom.load()
     write_motion(plan(boom, "transport", "phenotyping").trajectory, place / "motion.csv")

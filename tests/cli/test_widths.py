@@ -1,4 +1,5 @@
-"""Answers fit the terminal: at four widths no line is wider, no number is cut, and at 80 columns no answer is long."""
+"""Answers fit the terminal: at four widths no line is wider, no number is cut, and at 80 columns no
+answer is long."""
 
 import re
 import shlex

@@ -1,4 +1,5 @@
-"""The nonlinear simulation: against MuJoCo, exact tracking, convergence, and what drives and disturbances do to it."""
+"""The nonlinear simulation: against MuJoCo, exact tracking, convergence, and what drives and
+disturbances do to it."""
 
 from dataclasses import replace
 
@@ -45,7 +46,8 @@ def case(plant, controller, move, goals=None):
 
 
 class Tree:
-    """The boom in MuJoCo, held at its mount, with the drives' inertia and viscous friction put to its joints."""
+    """The boom in MuJoCo, held at its mount, with the drives' inertia and viscous friction put to
+    its joints."""
 
     def __init__(self, boom, viscous=0.0):
         self.model, self.G = mujoco_model(boom), tree_matrix(boom)
@@ -66,7 +68,8 @@ class Tree:
 
 
 def test_the_rigid_boom_under_given_torques_moves_as_in_mujoco_for_5_s():
-    """Open loop: the boom hangs and is swung, with friction, so that an error does not grow of itself."""
+    """Open loop: the boom hangs and is swung, with friction, so that an error does not grow of
+    itself."""
     viscous = np.array([20.0, 30.0, 20.0, 30.0, 0.3])
     boom = replace(BOOM, friction=Friction(viscous, np.zeros(5), (None,) * 5))
     tree, t = Tree(boom, viscous), np.linspace(0.0, 5.0, 51)
@@ -159,7 +162,8 @@ def test_cases_do_not_touch_each_other(moves):
 
 
 def test_pd_is_passive(moves):
-    """At a standing command, kinetic and elastic energy, weight and the controller's spring together only fall."""
+    """At a standing command, kinetic and elastic energy, weight and the controller's spring
+    together only fall."""
     plant = Plant.of(BOOM, EXACT, reference=GOAL)
     still = plan(BOOM, "phenotyping", "phenotyping")
     loop = case(plant, Controller.PD, still)
@@ -176,7 +180,8 @@ def test_pd_is_passive(moves):
 
 
 def test_a_slow_push_bends_the_boom_by_its_stiffness():
-    """At the gust's slow top the tip gives way by J K^-1 J^T F: the controllers' springs and the gearboxes' in series."""
+    """At the gust's slow top the tip gives way by J K^-1 J^T F: the controllers' springs and the
+    gearboxes' in series."""
     light = Figures.of({**{n: getattr(EXACT, n) for n in EXACT.given}, "friction_share": 0.0})
     plant = Plant.of(BOOM, light, reference=GOAL)
     loop = case(plant, Controller.PD, plan(BOOM, "phenotyping", "phenotyping"), Goals.of(bandwidth_Hz=10.0))

@@ -54,7 +54,8 @@ def test_lqr_gives_coupled_joints_the_stated_poles_without_gravity():
 
 
 def test_lqr_minimises_the_stated_integral_over_torques():
-    """python-control solves the problem of the docstring with torques as inputs; `design` states it in accelerations."""
+    """python-control solves the problem of the docstring with torques as inputs; `design` states it
+    in accelerations."""
     gains = design(PLANT, Controller.LQR, GOALS, GOAL)
     linear, M = linearise(Plant.of(BOOM, elastic=False), GOAL), mass_matrix(BOOM, GOAL, drive_inertia=True)
     a, zeta = 0.4, 0.8
@@ -154,7 +155,8 @@ def test_a_phase_margin_is_the_loops_distance_from_minus_one():
 
 
 def test_sampling_without_delay_gives_the_continuous_poles():
-    """At 20 kHz and without a filter to speak of, the sampled loop of the rigid boom has computed torque's own poles."""
+    """At 20 kHz and without a filter to speak of, the sampled loop of the rigid boom has computed
+    torque's own poles."""
     quick = Figures.of({"rate_Hz": 20000.0, "velocity_filter_Hz": 5000.0})
     plant = Plant.of(BOOM, quick, elastic=False)
     poles = analyse(plant, design(plant, Controller.COMPUTED_TORQUE, GOALS, GOAL), GOAL, responses=False).poles[:10]

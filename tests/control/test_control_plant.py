@@ -180,7 +180,8 @@ def test_rigid_links_on_gearboxes_swing_as_finite_elements_do(pose):
 
 @pytest.mark.parametrize("pose", POSES)
 def test_bending_links_swing_as_finite_elements_do(pose):
-    """One spring a link, with the mass where the rigid link has it, against 24 beam elements: within 3 % and 1.5 %."""
+    """One spring a link, with the mass where the rigid link has it, against 24 beam elements:
+    within 3 % and 1.5 %."""
     q, plant = POSES[pose], Plant.of(BOOM)
     gears = tangent_at_rest(replace(plant, bends=False), q)
     ours = natural_frequencies(plant.with_boom(replace(BOOM, gravity=0.0)), q, tangent_at_rest(plant, q))

@@ -1,4 +1,5 @@
-"""Calibration of simulated machines: errors against what the noise allows, intervals, bad targets, bad input."""
+"""Calibration of simulated machines: errors against what the noise allows, intervals, bad targets,
+bad input."""
 
 from dataclasses import replace
 
@@ -40,7 +41,8 @@ def poses(rng, count):
 
 
 def machine(rng, *, unequal=True):
-    """A boom whose nine lengths are off by 2 mm and whose five zeros by 0.5 deg or 2 mm, seen from anywhere."""
+    """A boom whose nine lengths are off by 2 mm and whose five zeros by 0.5 deg or 2 mm, seen from
+    anywhere."""
     names = (*LENGTHS, *OFFSETS)
     off = {name: rng.choice([-2e-3, 2e-3]) for name in (*LENGTHS, OFFSETS[3])}
     off |= {name: rng.choice([-1.0, 1.0]) * np.radians(0.5) for i, name in enumerate(OFFSETS) if i != 3}
@@ -80,7 +82,8 @@ def test_the_derivative_is_that_of_the_tip():
 
 
 def test_tips_that_were_not_measured_are_predicted_as_well_as_the_noise_allows_and_intervals_are_right():
-    """Of 12 machines; 100 give 1.006 of what the noise allows in all, at most 1.42 for one, and 94.7 % in 95 % intervals."""
+    """Of 12 machines; 100 give 1.006 of what the noise allows in all, at most 1.42 for one, and
+    94.7 % in 95 % intervals."""
     errors, allowed, inside, before, equal, off = [], [], [], [], [], []
     for seed in range(12):
         model, found, rng = calibrated(seed)
@@ -106,7 +109,8 @@ def test_tips_that_were_not_measured_are_predicted_as_well_as_the_noise_allows_a
 
 
 def test_parameters_lie_in_their_intervals():
-    """With the held parameters at their true values, (p - p_true)^T C^-1 (p - p_true) is chi-square."""
+    """With the held parameters at their true values, (p - p_true)^T C^-1 (p - p_true) is
+    chi-square."""
     squares, counts = [], []
     for seed in range(8):
         rng = np.random.default_rng(100 + seed)

@@ -1,4 +1,5 @@
-"""A log beside its plan: errors that were put in come out, and noise stays what the filter's theory says."""
+"""A log beside its plan: errors that were put in come out, and noise stays what the filter's theory
+says."""
 
 import json
 import subprocess
@@ -73,7 +74,8 @@ def test_a_log_of_the_plan_itself_shows_no_error(planned: Trajectory):
 
 
 def test_between_its_samples_the_plan_is_the_planned_motion(planned: Trajectory, finer: Move):
-    """A cubic through q and qd of a jerk-limited move is that move, but where the jerk jumps within a step."""
+    """A cubic through q and qd of a jerk-limited move is that move, but where the jerk jumps within
+    a step."""
     samples = finer.trajectory
     found = compare(BOOM, planned, Log.of(samples.t, samples.q, samples.qd, samples.qdd))
     assert np.abs(found.joint_error).max() < 1e-8
@@ -119,7 +121,8 @@ def test_torque_error_of_a_noisy_log_is_what_theory_says(rate: float, payload_as
 
 
 def test_the_filters_gain_is_the_textbooks():
-    """Of a second derivative by a quadratic or cubic over N even samples: sqrt(720 / (N (N^2 - 1) (N^2 - 4))) / h^2."""
+    """Of a second derivative by a quadratic or cubic over N even samples: sqrt(720 / (N (N^2 - 1)
+    (N^2 - 4))) / h^2."""
 
     def left(ready: Smoothed) -> Array:
         return np.sqrt(ready.covariance[:, 2, 2])
@@ -167,7 +170,8 @@ def test_the_best_offset_finds_the_clocks_difference(lag: float, planned: Trajec
 
 
 def test_the_best_offset_finds_a_piece_of_a_long_motion_of_many_cycles():
-    """A minute of swings, one a second, each a little wider: a search from one place would end in a neighbour's."""
+    """A minute of swings, one a second, each a little wider: a search from one place would end in a
+    neighbour's."""
     t = np.arange(6000) * 0.01
     swing = 0.005 * t[:, None] * np.array([1.0, 0.5, 0.5, 0.3, 1.0])
     q = np.array([1.0, 0.8, 2.0, 0.5, 0.0]) + swing * np.sin(2 * np.pi * t)[:, None]

@@ -1,4 +1,5 @@
-"""Motions designed for identification: better than random ones, within every limit, from rest to rest."""
+"""Motions designed for identification: better than random ones, within every limit, from rest to
+rest."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,9 @@
-"""The boom as URDF and MJCF in Drake: joints, limits, actuators, masses, gravity torques, and the loop that Drake closes.
+"""The boom as URDF and MJCF in Drake: joints, limits, actuators, masses, gravity torques, and the
+loop that Drake closes.
 
-Drake installs on fewer machines than this project, so its file is not collected with the suite: `.ci/run` installs Drake where
-that is possible, runs this file by its name, and says so where it is not.
+Drake installs on fewer machines than this project, so its file is not collected with the suite:
+`.ci/run` installs Drake where that is possible, runs this file by its name, and says so where it is
+not.
 """
 
 from pathlib import Path

@@ -1,4 +1,5 @@
-"""The boom as URDF and MJCF, loaded by Pinocchio and MuJoCo: the same tip, torques and pin force as the model's."""
+"""The boom as URDF and MJCF, loaded by Pinocchio and MuJoCo: the same tip, torques and pin force as
+the model's."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -200,7 +201,8 @@ def followed() -> tuple[Simulated, Array]:
 
 
 def test_mjcf_follows_the_main_move_through_its_closed_loop_on_the_models_torques(followed: tuple[Simulated, Array]):
-    """MuJoCo's own integration and its constraint's softness are the difference: 2e-4 of the largest torque."""
+    """MuJoCo's own integration and its constraint's softness are the difference: 2e-4 of the
+    largest torque."""
     simulated, _ = followed
     assert simulated.gap < 3e-7
     assert np.abs(simulated.tracking).max() < 4e-5
@@ -235,7 +237,8 @@ def test_mjcf_has_the_models_mass_matrix_and_tip(name: str):
 
 
 def test_mjcf_stands_still_at_its_keyframes():
-    """Whole seconds on the motors' torques alone: a boom whose friction holds the little that is left."""
+    """Whole seconds on the motors' torques alone: a boom whose friction holds the little that is
+    left."""
     boom = BOOMS["generic"]
     model, data, _ = in_mujoco(boom)
     assert model.nkey == len(boom.poses)

@@ -1,4 +1,5 @@
-"""A field day as files: a vehicle that drives past plots, its boom that sweeps, and what sees what, known exactly."""
+"""A field day as files: a vehicle that drives past plots, its boom that sweeps, and what sees what,
+known exactly."""
 
 from pathlib import Path
 
@@ -69,7 +70,8 @@ def joint_position(t: Array) -> Array:
 
 
 def sensor_on_vehicle(boom: Boom, q: Array) -> tuple[Array, Array]:
-    """Position (n, 3) and turn R_body_11 (n, 3, 3) of the sensor, written out without the code under test."""
+    """Position (n, 3) and turn R_body_11 (n, 3, 3) of the sensor, written out without the code
+    under test."""
     tip = forward_kinematics(boom, q)
     turn = np.radians(2.0)  # heading -2 deg is anticlockwise
     R = np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
@@ -100,7 +102,8 @@ def write_field(folder: Path, drive: Drive, seconds: float = 20.0, *, utc: float
 
 
 def true_spots(boom: Boom, drive: Drive, stamps: Array, q: Array) -> tuple[Array, Array]:
-    """Where the sensor was (n, 3), and the canopy that it saw (n, 3), in east-north-up, by marching along the ray."""
+    """Where the sensor was (n, 3), and the canopy that it saw (n, 3), in east-north-up, by marching
+    along the ray."""
     t = stamps - 0.02
     R = attitude.rotation(*drive.angles(t).T)
     at, turn = sensor_on_vehicle(boom, q)

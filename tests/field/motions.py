@@ -1,4 +1,5 @@
-"""A vehicle that drives, rolls and pitches as closed formulas say, and what its instruments would have logged."""
+"""A vehicle that drives, rolls and pitches as closed formulas say, and what its instruments would
+have logged."""
 
 from dataclasses import dataclass
 

@@ -54,7 +54,8 @@ def test_within_metres_of_a_pole_heights_are_right_to_three_micrometres():
 
 @pytest.mark.parametrize("place", PLACES)
 def test_horizontal_distance_and_azimuth_equal_geographiclib(place):
-    """On the ellipsoid, a point's distance along the geodesic and its azimuth; chord and arc differ by s^3 / 24 R^2."""
+    """On the ellipsoid, a point's distance along the geodesic and its azimuth; chord and arc differ
+    by s^3 / 24 R^2."""
     latitude, longitude = PLACES[place]
     for azimuth in np.arange(0.0, 360.0, 30.0):
         there = Geodesic.WGS84.Direct(latitude, longitude, azimuth, 100.0)

@@ -1,4 +1,5 @@
-"""Injected delays, lever arms and mounting angles are found again, as well as their covariance says."""
+"""Injected delays, lever arms and mounting angles are found again, as well as their covariance
+says."""
 
 import numpy as np
 import pytest
@@ -47,7 +48,8 @@ def test_errors_are_as_the_covariance_says():
 
 
 def test_mounting_angles_of_the_boom_are_found():
-    """The boom sweeps while the vehicle drives; its mount is turned by 0.5, -0.8 and 1.2 deg more than the rig says."""
+    """The boom sweeps while the vehicle drives; its mount is turned by 0.5, -0.8 and 1.2 deg more
+    than the rig says."""
     boom, random = Boom.load(), np.random.default_rng(5)
     mount, turned = np.array([1.2, 0.6, 0.5]), np.radians([0.5, -0.8, 1.2])
 

@@ -124,7 +124,8 @@ def test_without_error_it_is_inside_or_not():
 
 
 def test_probabilities_are_calibrated():
-    """Of points said to be on their plot with a probability in a band, that share is on it (a reliability diagram)."""
+    """Of points said to be on their plot with a probability in a band, that share is on it (a
+    reliability diagram)."""
     plots, random, n = trial()[0], np.random.default_rng(3), 20_000
     west, south, east, north = shapely.MultiPolygon(plots.polygons).bounds
     true = random.uniform([west - 1.0, south - 1.0], [east + 1.0, north + 1.0], (n, 2))

@@ -1,4 +1,5 @@
-"""Row scans: coverage counted again by sampled points, moves within limits, the mission file, what cannot be reached."""
+"""Row scans: coverage counted again by sampled points, moves within limits, the mission file, what
+cannot be reached."""
 
 import time
 
@@ -58,7 +59,8 @@ def test_the_tip_keeps_its_height_and_looks_down(stopped):
 
 
 def test_the_track_is_beside_the_rows(stopped):
-    """Every stop is as far from the middle line of its row as the offset says, and within half a plot of one."""
+    """Every stop is as far from the middle line of its row as the offset says, and within half a
+    plot of one."""
     middles = np.array([polygon.centroid.coords[0] for polygon in stopped.plots.polygons])
     assert len(stopped.track) == sum(len(visit.stops) for visit in stopped.visits)
     for row, stops in enumerate(np.split(stopped.track, 10), start=1):

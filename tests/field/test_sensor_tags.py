@@ -1,4 +1,5 @@
-"""The sensor at the end of the boom: a whole field day known exactly, its sag, its covariance against samples."""
+"""The sensor at the end of the boom: a whole field day known exactly, its sag, its covariance
+against samples."""
 
 from dataclasses import replace
 

@@ -28,7 +28,8 @@ print(json.dumps(found))
 
 @pytest.fixture(scope="module")
 def designs():
-    """Masses and gaps of `boom link`, with the thesis's load, and by the thesis's method, under each kernel."""
+    """Masses and gaps of `boom link`, with the thesis's load, and by the thesis's method, under
+    each kernel."""
     command = [sys.executable, "-c", DESIGN]
     environments = [os.environ | {"OPENBLAS_CORETYPE": kernel, "OPENBLAS_NUM_THREADS": "1"} for kernel in KERNELS]
     root = Path(__file__).parents[2]

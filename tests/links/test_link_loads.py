@@ -1,4 +1,5 @@
-"""Loads of links from moves: equilibrium of the whole link with its joint's torque, and the motion of its pins."""
+"""Loads of links from moves: equilibrium of the whole link with its joint's torque, and the motion
+of its pins."""
 
 import numpy as np
 import pytest
@@ -48,7 +49,8 @@ def test_inner_load_is_that_of_the_dynamics(payload_as):
 
 @pytest.mark.parametrize("name", ["inner", "lower", "outer"])
 def test_end_load_and_own_inertia_are_in_balance_with_the_joint(name):
-    """Euler's equation of the link about its root, with the boom's own body: the moment left is the joint's torque."""
+    """Euler's equation of the link about its root, with the boom's own body: the moment left is the
+    joint's torque."""
     moving = motion()
     q, qd, qdd = moving.q, moving.qd, moving.qdd
     cases, _ = link_cases(BOOM, load_link(BOOM, name), [moving])

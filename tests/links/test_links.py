@@ -1,4 +1,5 @@
-"""The design of a link as a job: the thesis's link and its saving, files, the command, the recording."""
+"""The design of a link as a job: the thesis's link and its saving, files, the command, the
+recording."""
 
 import json
 import subprocess

@@ -84,7 +84,8 @@ def test_a_cycle_is_one_long_motion_without_weights(mission):
 
 
 def test_a_pause_takes_its_motors_share_of_the_rms_torque_alone(mission):
-    """Standing stretched out 4 s with the motor on and 12 s with it off: half the RMS torque of standing with it on."""
+    """Standing stretched out 4 s with the motor on and 12 s with it off: half the RMS torque of
+    standing with it on."""
     demands = []
     for steps in ("[[steps]]\nhold_s = 4\n", "[[steps]]\nhold_s = 4\n[[steps]]\npause_s = 12\n"):
         standing = mission(steps, HEAD.replace("transport", "phenotyping"))

@@ -1,4 +1,5 @@
-"""Vehicle cases: their motion against differences of their own pose, and what they do to a plan and its checks."""
+"""Vehicle cases: their motion against differences of their own pose, and what they do to a plan and
+its checks."""
 
 from dataclasses import replace
 
@@ -122,7 +123,8 @@ def test_shock_is_held_against_the_momentary_peak_torque_alone():
 
 
 def test_a_case_says_how_often_its_shock_comes(tmp_path):
-    """At 2.5 s joint 2 of the main move turns at 18 deg/s: less than half a turn of the input in 30 ms, so 1e4 times."""
+    """At 2.5 s joint 2 of the main move turns at 18 deg/s: less than half a turn of the input in 30
+    ms, so 1e4 times."""
     head = 'name = "often"\nbasis = "assumed"\nsource = "made up"\n[shock]\npeak_m_s2 = 29.43\nduration_s = 0.03\n'
     (tmp_path / "often.toml").write_text(head + "start_s = 2.5\nevents = 20000\n")
     silent, often = load_case("shock"), load_case(str(tmp_path / "often.toml"))
@@ -152,7 +154,8 @@ def test_a_shock_between_the_samples_of_a_file_is_not_checkable():
 
 
 def test_plan_knows_the_slope():
-    """On a slope so steep that the drives decide, the least time is another than on level ground, and still keeps them."""
+    """On a slope so steep that the drives decide, the least time is another than on level ground,
+    and still keeps them."""
     heavy = BOOM.with_payload(20.0)
     level, steep = (plan(heavy, "transport", "phenotyping", profile="time-optimal", vehicle=v) for v in (LEVEL, SLOPE))
     assert abs(steep.report.duration - level.report.duration) > 1e-3

@@ -24,7 +24,8 @@ _CAMERA = {
 
 
 class Tab:
-    """What a tab has been told by the server: elements by uuid, nodes of the scene, whole files, notifications."""
+    """What a tab has been told by the server: elements by uuid, nodes of the scene, whole files,
+    notifications."""
 
     def __init__(self, address: str) -> None:
         self.elements: dict[str, dict[str, Any]] = {}

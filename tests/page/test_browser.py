@@ -135,7 +135,8 @@ def browser(page, tmp_path):
 
 
 def requests_of_pages(log: Path) -> set[str]:
-    """Addresses that a page or its workers asked for, as Chromium's network log has them; not the browser's own."""
+    """Addresses that a page or its workers asked for, as Chromium's network log has them; not the
+    browser's own."""
     whole = json.loads(log.read_text())
     begun = whole["constants"]["logEventTypes"]["URL_REQUEST_START_JOB"]
     asked = [event["params"] for event in whole["events"] if event["type"] == begun and "params" in event]

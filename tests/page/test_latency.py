@@ -1,4 +1,5 @@
-"""From a slider's move to the new picture and bars, against an echo on the same connection; planning against the library.
+"""From a slider's move to the new picture and bars, against an echo on the same connection;
+planning against the library.
 
 It is run with the tests in the browser, which have the machine for themselves.
 """

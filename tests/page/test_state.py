@@ -1,4 +1,5 @@
-"""The page's state: what is accepted, what is refused with the last good state kept, and the files that repeat it."""
+"""The page's state: what is accepted, what is refused with the last good state kept, and the files
+that repeat it."""
 
 import shlex
 

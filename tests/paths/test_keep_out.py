@@ -1,4 +1,5 @@
-"""Shapes to keep away from: distances by convex search in place of a collision library, detours, refusals, the file's table."""
+"""Shapes to keep away from: distances by convex search in place of a collision library, detours,
+refusals, the file's table."""
 
 import sys
 
@@ -20,7 +21,8 @@ GROUND = Box("ground", np.array([0.0, 0.0, -1.5]), np.array([20.0, 20.0, 1.0]), 
 
 
 def lines(q):
-    """Both ends of each link (..., 7, 2, 3), from the plane geometry of the linkage (thesis, figure 2-1)."""
+    """Both ends of each link (..., 7, 2, 3), from the plane geometry of the linkage (thesis, figure
+    2-1)."""
     g = BOOM.geometry
     yaw, inner, lower, extension, wrist = np.moveaxis(np.asarray(q), -1, 0)
 
@@ -49,8 +51,8 @@ def from_point(shape, p):
 
 
 def distances(boom, q):
-    """(..., 7, shapes): the distance from a point that runs along a link is convex in its place, so a ternary search finds
-    the least."""
+    """(..., 7, shapes): the distance from a point that runs along a link is convex in its place, so
+    a ternary search finds the least."""
     ends, keep = lines(q), boom.keep_out
     found = []
     for shape in keep.shapes:

@@ -1,4 +1,5 @@
-"""Redundancy along whole lines of the tip: smooth curves, as quick as simple ones, and what they cost is told truly."""
+"""Redundancy along whole lines of the tip: smooth curves, as quick as simple ones, and what they
+cost is told truly."""
 
 from functools import cache
 

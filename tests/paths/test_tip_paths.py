@@ -1,4 +1,5 @@
-"""Lines and arcs of the tip: their geometry, the joint paths that follow them, and the moves planned along them."""
+"""Lines and arcs of the tip: their geometry, the joint paths that follow them, and the moves
+planned along them."""
 
 import re
 
@@ -191,7 +192,8 @@ def test_no_hold_flips_where_its_own_choice_could_go_on(constraint):
     ids=str,
 )
 def test_a_line_that_leaves_the_reach_names_where(constraint):
-    """With the actuator horizontal the extension ends the reach: r = L2 + L9 cos(theta2) + L7 + 1 m."""
+    """With the actuator horizontal the extension ends the reach: r = L2 + L9 cos(theta2) + L7 + 1
+    m."""
     curve = line((1.4, 0.0, 1.0), (2.6, 0.0, 1.0))
     with pytest.raises(InfeasibleError, match="the tip's path leaves the workspace at") as caught:
         follow(BOOM, curve, DOWN, constraint)
@@ -210,7 +212,8 @@ def test_a_line_that_leaves_the_reach_names_where(constraint):
 
 
 def test_a_line_that_one_branch_can_follow_from_end_to_end_is_followed():
-    """The branch nearest to the middle of the ranges runs out of extension at 42 %, the other one never."""
+    """The branch nearest to the middle of the ranges runs out of extension at 42 %, the other one
+    never."""
     constraint = ActuatorAngle(-0.05)
     curve = line((1.0, 1.1, 1.0), (0.6, 1.45, 0.95))
     follow(BOOM, curve, -1.2, constraint, reference=(0.83, 1.22, 3.09, 0.34, 0.42))
@@ -224,7 +227,8 @@ def test_a_line_that_starts_out_of_reach_says_so():
 
 @pytest.mark.parametrize("y", [0.3, -0.3])
 def test_a_line_across_the_end_of_yaw_forces_a_flip(y):
-    """Of 64 equal steps the 33rd is the first beyond y = 0 from below, and the 32nd, on it, is at 0 deg from above."""
+    """Of 64 equal steps the 33rd is the first beyond y = 0 from below, and the 32nd, on it, is at 0
+    deg from above."""
     with pytest.raises(InfeasibleError, match=r"forces a change of branch under constraint horizontal at 5[01]") as caught:
         follow(BOOM, line((1.4, y, 1.0), (1.4, -y, 1.0)), DOWN, ActuatorHorizontal())
     assert float(re.search(r"\(1.4, ([^,]+), 1\) m", str(caught.value))[1]) == pytest.approx(0.0, abs=0.6 / 64)
@@ -323,7 +327,8 @@ def test_an_arc_is_followed(profile):
 
 
 def test_a_leg_goes_on_from_the_branch_of_the_one_before():
-    """On its own the second leg would start on the other branch, which is nearer to the middle of the joints' ranges."""
+    """On its own the second leg would start on the other branch, which is nearer to the middle of
+    the joints' ranges."""
     corner, goal = TipTarget((0.0, 1.2, 1.05)), TipTarget((-0.3, 1.15, 1.05))
     alone = plan(BOOM, corner, goal, along="line")
     move = plan(BOOM, TipTarget((0.0, 1.6, 1.05)), goal, via=[corner], along="line")

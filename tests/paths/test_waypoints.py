@@ -21,7 +21,8 @@ VELOCITIES = np.array([[0.25, 0.15, 0.5, 0.1, 0.3], [0.2, 0.1, 0.3, -0.05, 0.0]]
 
 
 def passages(motion, waypoints):
-    """Times at which a motion passes waypoints (n, 5): where its nearest joint positions to them are, bisected on speed."""
+    """Times at which a motion passes waypoints (n, 5): where its nearest joint positions to them
+    are, bisected on speed."""
     from scipy.optimize import minimize_scalar
 
     t = np.linspace(0.0, motion.duration, 20_001)
@@ -39,7 +40,8 @@ def passages(motion, waypoints):
 
 
 def assert_continuous(motion, orders):
-    """No jump of the derivatives of these orders anywhere: between dense samples they change by their own slope."""
+    """No jump of the derivatives of these orders anywhere: between dense samples they change by
+    their own slope."""
     t = np.linspace(0.0, motion.duration, 40_001)
     states = motion(t)
     for order in orders:
@@ -80,7 +82,8 @@ def test_the_fast_profiles_are_faster_through_waypoints_than_stopping_at_them():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_cubic_through_waypoints_is_no_slower_than_with_knots_in_proportion_to_the_chords(seed):
-    """Against the two customary spacings of a spline's knots, on random waypoints inside the limits."""
+    """Against the two customary spacings of a spline's knots, on random waypoints inside the
+    limits."""
     from scipy.interpolate import CubicSpline
 
     rng = np.random.default_rng(seed)

@@ -1,4 +1,5 @@
-"""The panel's own parts read back: colours of the path, arrows, planes, margins, texts, and several moves in one recording."""
+"""The panel's own parts read back: colours of the path, arrows, planes, margins, texts, and several
+moves in one recording."""
 
 import json
 import re
@@ -105,7 +106,8 @@ BANDS = {"0072b2": 0.2, "56b4e9": 0.4, "009e73": 0.6, "f0e442": 0.8, "e69f00": 1
 
 
 def ratio_by_datasheet(boom: Boom, move: Move) -> Array:
-    """The worst drive's torque / limit from the figures of its sheet, sample by sample, written out: (n,)."""
+    """The worst drive's torque / limit from the figures of its sheet, sample by sample, written
+    out: (n,)."""
     ratios, motion = [], move.trajectory
     for i, drive in enumerate(boom.drives):
         if drive is None:

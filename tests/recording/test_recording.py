@@ -97,7 +97,8 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 
 @pytest.fixture(scope="module")
 def standing(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    """The empty move, without a payload, of a boom whose position limits and coupled limit are assumed ones."""
+    """The empty move, without a payload, of a boom whose position limits and coupled limit are
+    assumed ones."""
     assumed = Origin(Basis.ASSUMED, "this test")
     origins = {**BOOM.limits.origins, "position": (assumed,) * 5, "linkage": (assumed,)}
     boom = replace(BOOM, limits=replace(BOOM.limits, origins=origins)).with_payload(0.0)

@@ -1,7 +1,8 @@
-"""What the viewer itself makes of a recording, where it can run: poses by its own transform graph, pictures, its log.
+"""What the viewer itself makes of a recording, where it can run: poses by its own transform graph,
+pictures, its log.
 
-It runs where a Vulkan driver is found, be it one that draws in software. The poses are held against the model by two readers:
-the file's everywhere, the viewer's where it runs.
+It runs where a Vulkan driver is found, be it one that draws in software. The poses are held against
+the model by two readers: the file's everywhere, the viewer's where it runs.
 """
 
 import io
@@ -52,7 +53,8 @@ def by_the_file(path: Path, move: Move, at: Array) -> Poses:
 
 
 def by_the_viewer(path: Path, move: Move, at: Array) -> Poses:
-    """By the viewer's transform graph, with a picture at three of the times: all differ, and its log has no errors."""
+    """By the viewer's transform graph, with a picture at three of the times: all differ, and its
+    log has no errors."""
     found: dict[str, list[Array]] = {}
     pictures = []
     program = shutil.which("rerun", path=sysconfig.get_path("scripts"))
@@ -77,7 +79,8 @@ def by_the_viewer(path: Path, move: Move, at: Array) -> Poses:
 
 
 def _graph(viewer: ViewerClient, time: int) -> dict[str, Array]:
-    """Pose of every frame in "mount", once the viewer has taken the data in and stands at that time [ns]."""
+    """Pose of every frame in "mount", once the viewer has taken the data in and stands at that time
+    [ns]."""
     for _ in range(50):
         graph = viewer.get_transform_graph(frame_filter="named", include_transforms=True)
         edges = {edge["child"]: edge["source"] for edge in graph["edges"] if edge["parent"] == "mount"}

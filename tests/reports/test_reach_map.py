@@ -1,4 +1,5 @@
-"""The reach map: its boundary against closed forms, its cells against kinematics and dynamics, its picture and recording."""
+"""The reach map: its boundary against closed forms, its cells against kinematics and dynamics, its
+picture and recording."""
 
 import itertools
 import json
@@ -37,7 +38,8 @@ R, Z = np.arange(-3.0, 3.0, 0.05), np.arange(-2.0, 1.5, 0.05)
 @pytest.mark.parametrize("extension", [0.0, 0.5])
 @pytest.mark.parametrize("pitch", [DOWN, 0.0])
 def test_geometry_reaches_a_ring_about_the_shoulder_under_a_fixed_extension(extension, pitch):
-    """The wrist's distance from the shoulder is between |L9 - a| and L9 + a, a = hypot(L7 + theta4, L6), on either side."""
+    """The wrist's distance from the shoulder is between |L9 - a| and L9 + a, a = hypot(L7 + theta4,
+    L6), on either side."""
     found = reach_map(BOOM, FixedExtension(extension), pitch, R, Z)
     arm = np.hypot(G.L7 + extension, G.L6)
     r, z = np.meshgrid(R, Z)
@@ -76,7 +78,8 @@ def test_every_cell_is_reached_within_the_limits_with_its_margin(constraint):
 @pytest.mark.parametrize("constraint", [ActuatorHorizontal(), FixedExtension(0.4), LeastExtension()], ids=str)
 @pytest.mark.parametrize("pitch", [DOWN, -1.2])
 def test_boundary_within_the_limits_is_where_joint_positions_within_them_end(constraint, pitch):
-    """Forward kinematics of all joint positions within the limits that meet constraint and pitch, against the map, to a cell.
+    """Forward kinematics of all joint positions within the limits that meet constraint and pitch,
+    against the map, to a cell.
 
     A sliver between the cells' middles is no cell of the map.
     """

@@ -1,4 +1,5 @@
-"""Requirement sheets: what meets one passes the checks; stiffness and backlash against the model of the whole arm."""
+"""Requirement sheets: what meets one passes the checks; stiffness and backlash against the model of
+the whole arm."""
 
 from dataclasses import fields, replace
 
@@ -93,7 +94,8 @@ def needs(lived):
 
 
 def random_drive(rng, need):
-    """A drive whose figures lie on both sides of what is required, with one of them missing now and then."""
+    """A drive whose figures lie on both sides of what is required, with one of them missing now and
+    then."""
 
     def about(figure, low=0.8, high=2.5):
         return float(figure * rng.uniform(low, high))

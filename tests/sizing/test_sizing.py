@@ -65,7 +65,8 @@ def test_without_a_voltage_anywhere_there_is_none_to_try(main):
 
 
 def test_every_row_is_the_checks_own(cycle):
-    """A drive put on the boom and checked with the whole mission gives the rows that it was judged by."""
+    """A drive put on the boom and checked with the whole mission gives the rows that it was judged
+    by."""
     for judged in sized(joint="lower"):
         report = check_cycle(BOOM.with_drive("lower", judged.drive), cycle)
         rows = tuple(
@@ -153,7 +154,8 @@ def test_what_static_torque_forbids_no_slowness_mends():
 
 
 def test_replanning_suits_the_moves_to_the_drive():
-    """Time-optimal moves of a weaker motor take longer, and keep its margin; a motor too weak finds none."""
+    """Time-optimal moves of a weaker motor take longer, and keep its margin; a motor too weak finds
+    none."""
     drives = [d for d in candidates(BOOM, "lower", CATALOGUE) if d.wiring.value is Wiring.SERIES]
     mission = load_mission("field-day")
     steps = [replace_profile(step) for step in mission.table.steps if step.repeat is None]
@@ -173,7 +175,8 @@ def test_replanning_suits_the_moves_to_the_drive():
 
 @pytest.fixture
 def undersized(tmp_path):
-    """A mission that the fitted drive of lower cannot do with 30 kg, and a catalogue with one that can."""
+    """A mission that the fitted drive of lower cannot do with 30 kg, and a catalogue with one that
+    can."""
     mission, catalogue = tmp_path / "quick.toml", tmp_path / "strong.toml"
     mission.write_text(UNDERSIZED_MISSION)
     catalogue.write_text(STRONG_CATALOGUE)
@@ -215,7 +218,8 @@ def test_another_joint_that_cannot_is_named_as_what_stands_in_the_way(undersized
 
 
 def test_replanning_plans_on_the_slope_and_with_the_variant(undersized):
-    """Uphill with 22 kg a time-optimal move takes longer; and another payload's motion says nothing of the fitted drive."""
+    """Uphill with 22 kg a time-optimal move takes longer; and another payload's motion says nothing
+    of the fitted drive."""
     mission, slope, boom = undersized[0], load_case("slope"), BOOM.with_payload(22.0)
     drive = boom.drives[2]
     (level,), (tilted,) = (

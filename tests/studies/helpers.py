@@ -69,7 +69,8 @@ def results_of(
     boundary: str | None = None,
     more: dict[str, Array] | None = None,
 ) -> Results:
-    """The dataset of a function y(coordinates) as a study would write it; it FAILs where y is above a bound."""
+    """The dataset of a function y(coordinates) as a study would write it; it FAILs where y is above
+    a bound."""
     points = design(kind, factors, samples, seed)
     y = function(points.coordinates)
     off = np.isin(np.arange(len(y)), refused or [])

@@ -1,4 +1,5 @@
-"""Sensitivity, probability, propagation and Pareto front against functions and integrals that are known exactly."""
+"""Sensitivity, probability, propagation and Pareto front against functions and integrals that are
+known exactly."""
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ def sobol_g(x):
 
 
 def g_indices():
-    """First and total indices of Sobol's g-function: V_i = 1 / (3 (1 + a_i)^2), V = prod(1 + V_i) - 1."""
+    """First and total indices of Sobol's g-function: V_i = 1 / (3 (1 + a_i)^2), V = prod(1 + V_i) -
+    1."""
     parts = 1.0 / (3.0 * (1.0 + G) ** 2)
     whole = np.prod(1.0 + parts) - 1.0
     return parts / whole, np.array([p * np.prod(1.0 + np.delete(parts, i)) for i, p in enumerate(parts)]) / whole

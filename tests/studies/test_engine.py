@@ -1,4 +1,5 @@
-"""The engine: the same dataset to the bit from one process, local workers, a scheduler's workers, and after kills."""
+"""The engine: the same dataset to the bit from one process, local workers, a scheduler's workers,
+and after kills."""
 
 import errno
 import os

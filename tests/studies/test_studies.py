@@ -220,7 +220,8 @@ def test_a_placeholder_is_filled(loaded):
 
 
 def test_the_probability_of_a_hold_is_the_normal_one(loaded, tmp_path):
-    """A hold's torque is linear in the masses, so it is normal where they are; the rating is set to be passed in 3 of 10."""
+    """A hold's torque is linear in the masses, so it is normal where they are; the rating is set to
+    be passed in 3 of 10."""
     transport = Boom.load().pose("transport")
     heavier = Boom.load().with_payload(11.0)
     at = [abs(gravity_torque(b, transport)[1]) for b in (Boom.load(), heavier)]

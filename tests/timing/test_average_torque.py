@@ -25,7 +25,8 @@ def limited(limit):
 
 
 def averages(motion):
-    """Cube means (5,) of |tau| weighted by |qd|, by Gauss's rule in every piece of the law; 0 of what rests."""
+    """Cube means (5,) of |tau| weighted by |qd|, by Gauss's rule in every piece of the law; 0 of
+    what rests."""
     breaks = np.asarray(motion.law.s.x)
     nodes, weights = np.polynomial.legendre.leggauss(4 if len(breaks) > 100 else 40)
     half, middle = np.diff(breaks)[:, None] / 2.0, (breaks[1:] + breaks[:-1])[:, None] / 2.0

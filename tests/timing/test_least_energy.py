@@ -1,4 +1,5 @@
-"""The law of least copper loss against an independent convex program, the limits, and every other profile."""
+"""The law of least copper loss against an independent convex program, the limits, and every other
+profile."""
 
 from dataclasses import replace
 
@@ -46,10 +47,11 @@ def loss(boom, motion):
 
 
 def independent(boom, path, duration, intervals=320):
-    """Return the least loss [J] by CVXPY on midpoints, with the limits of the joints; those of the drives do not bind.
+    """Return the least loss [J] by CVXPY on midpoints, with the limits of the joints; those of the
+    drives do not bind.
 
-    Torques are inverse dynamics at the midpoint of each interval, where x is the mean of its ends. Time is in units of the
-    duration, and torque in a unit near its mean.
+    Torques are inverse dynamics at the midpoint of each interval, where x is the mean of its ends.
+    Time is in units of the duration, and torque in a unit near its mean.
     """
     s = (np.arange(intervals) + 0.5) / intervals
     p, p1, zero = path(s), path(s, 1), np.zeros((intervals, 5))
@@ -84,7 +86,8 @@ def test_the_loss_is_that_of_an_independent_program(boom, duration):
 
 
 def test_without_load_and_limits_the_law_is_a_parabola_of_speed():
-    """One joint, constant inertia: int qdd^2 dt is least for a cubic, 12 J^2 q^2 / T^3; limits do not bind in 20 s."""
+    """One joint, constant inertia: int qdd^2 dt is least for a cubic, 12 J^2 q^2 / T^3; limits do
+    not bind in 20 s."""
     boom = YAW
     start, goal = np.array([0.0, 0.6, 2.4, 0.3, 0.0]), np.array([1.0, 0.6, 2.4, 0.3, 0.0])
     path = JointLine(start, goal)

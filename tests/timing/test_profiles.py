@@ -27,7 +27,8 @@ VIA = np.array([0.7, 0.5, 2.0, 0.4, -0.2])
 
 
 def worst_ratios(move):
-    """Largest |demand| / limit of velocity, acceleration and drive torque, recomputed at half a millisecond."""
+    """Largest |demand| / limit of velocity, acceleration and drive torque, recomputed at half a
+    millisecond."""
     boom, fine = move.boom, sample(move.motions[0], 0.0005)
     tau = inverse_dynamics(boom, fine.q, fine.qd, fine.qdd, reactions=False).tau
     for i, drive in enumerate(boom.drives):
@@ -176,7 +177,8 @@ def test_time_optimal_is_no_slower_than_cubic():
 
 @pytest.mark.parametrize("payload", [16.0, 20.0, 24.0])
 def test_drives_torque_decides_the_time_optimal_move_under_a_heavy_payload(payload):
-    """The falling torque-speed curve is met, not passed: the worst ratio is 1, and a hundredth less time would break it."""
+    """The falling torque-speed curve is met, not passed: the worst ratio is 1, and a hundredth less
+    time would break it."""
     move = plan(BOOM.with_payload(payload), "transport", "phenotyping", profile="time-optimal")
     assert move.report.duration > 4.3333 + 1e-4
     assert worst_ratios(move)["torque"] == pytest.approx(1.0, abs=1e-3)

@@ -1,4 +1,5 @@
-"""Every profile on random and on degenerate moves: planned or refused with a reason, and no limit broken."""
+"""Every profile on random and on degenerate moves: planned or refused with a reason, and no limit
+broken."""
 
 from dataclasses import replace
 
@@ -41,7 +42,8 @@ def assert_keeps_limits(boom, start, goal, motion, jerk, step):
 
 @pytest.mark.parametrize(("kind", "name"), list(zip(KINDS, NAMES, strict=True)), ids=NAMES)
 def test_random_pairs_under_random_payloads(kind, name):
-    """Payloads reach beyond what the drives can hold: there, and only there, a move may be refused or be known to fail."""
+    """Payloads reach beyond what the drives can hold: there, and only there, a move may be refused
+    or be known to fail."""
     payloads = np.random.default_rng(7).uniform(0.0, 45.0, PAIRS[name])
     refused, limited = 0, 0
     for (start, goal), payload in zip(random_pairs(BOOM, PAIRS[name], 11), payloads, strict=True):

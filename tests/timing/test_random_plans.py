@@ -1,4 +1,5 @@
-"""Random plans of every kind: planned within every joint limit, or refused with a reason; a load alone may be too much."""
+"""Random plans of every kind: planned within every joint limit, or refused with a reason; a load
+alone may be too much."""
 
 import numpy as np
 import pytest
@@ -31,7 +32,8 @@ def held(plan, motion) -> float:
 
 
 def outcome(number: int) -> str:
-    """Whether the plan of that number is made, is refused, or loads a drive beyond what it holds; asserts the rest."""
+    """Whether the plan of that number is made, is refused, or loads a drive beyond what it holds;
+    asserts the rest."""
     plan = random_plan(number)
     try:
         motions = plan.motions()

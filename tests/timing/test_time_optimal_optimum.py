@@ -1,4 +1,5 @@
-"""The time-optimal profile against an independent optimum: direct collocation on Pinocchio's dynamics (`minimum_time.py`)."""
+"""The time-optimal profile against an independent optimum: direct collocation on Pinocchio's
+dynamics (`minimum_time.py`)."""
 
 from dataclasses import replace
 from functools import cache

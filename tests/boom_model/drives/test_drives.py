@@ -1,4 +1,5 @@
-"""Drives against numbers worked out by hand from the datasheets, and against their own curves turned round."""
+"""Drives against numbers worked out by hand from the datasheets, and against their own curves
+turned round."""
 
 from dataclasses import replace
 
@@ -37,7 +38,8 @@ def without(part: str, name: str) -> Drive:
 
 
 def random_drives(count: int, seed: int) -> list[Drive]:
-    """Motors of the catalogue in either wiring, some below the voltage that drives their current at standstill."""
+    """Motors of the catalogue in either wiring, some below the voltage that drives their current at
+    standstill."""
     rng = np.random.default_rng(seed)
     motors = list(Catalogue.load().motors.values())
     return [

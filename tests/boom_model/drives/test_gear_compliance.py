@@ -1,4 +1,5 @@
-"""Wind-up by hand, and what it does to the tip against forward kinematics, virtual work and an eigenvalue solver."""
+"""Wind-up by hand, and what it does to the tip against forward kinematics, virtual work and an
+eigenvalue solver."""
 
 from dataclasses import replace
 from itertools import product
@@ -94,7 +95,8 @@ def test_lost_motion_at_the_tip_is_the_worst_over_its_signs():
 
 
 def test_the_worst_over_signs_bounds_every_share_of_the_widths():
-    """Five joints with lost motion: no errors within the widths move the tip further, by 2,000 random ones."""
+    """Five joints with lost motion: no errors within the widths move the tip further, by 2,000
+    random ones."""
     boom = replace(BOOM, drives=(BOOM.drives[1],) * 5)
     q, tau = random_states(1, seed=4)
     shares = np.random.default_rng(5).uniform(-1.0, 1.0, (2000, 5)) * 290e-6

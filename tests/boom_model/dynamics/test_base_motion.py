@@ -89,7 +89,8 @@ def test_up_on_slope_is_the_vertical_in_the_rotated_base():
     ids=["level", "nose down", "right side down", "downhill", "right wheels low"],
 )
 def test_up_on_slope_of_plain_slopes(roll, pitch, up):
-    """Nose down, gravity pulls forward and up points backward; rolled about forward, the right side goes down."""
+    """Nose down, gravity pulls forward and up points backward; rolled about forward, the right side
+    goes down."""
     np.testing.assert_allclose(up_on_slope(roll, pitch), up, rtol=0, atol=1e-15)
 
 

@@ -1,4 +1,5 @@
-"""Loads of a motion against MuJoCo, Pinocchio, the textbook recursion, closed forms and the thesis's table 2-8."""
+"""Loads of a motion against MuJoCo, Pinocchio, the textbook recursion, closed forms and the
+thesis's table 2-8."""
 
 import re
 from dataclasses import fields, replace
@@ -50,7 +51,8 @@ STILL = np.zeros(5)
 
 
 def around(surroundings: str, count: int, rng: np.random.Generator) -> dict[str, Any]:
-    """What moves the base and acts on the tip: nothing, the same for all samples, or other for each."""
+    """What moves the base and acts on the tip: nothing, the same for all samples, or other for
+    each."""
     if surroundings == "still":
         return {}
     shape = () if surroundings == "constant" else (count,)
@@ -204,9 +206,11 @@ def test_pins_and_torques_hold_every_body_in_equilibrium(boom, payload_as, surro
 
 
 def equilibrium(boom: Boom, q: Array, loads: Loads, needs: dict[str, Need]) -> tuple[Array, float]:
-    """What is missing in the equations of the arm's plane, two forces and a moment a body, and the largest pin force.
+    """What is missing in the equations of the arm's plane, two forces and a moment a body, and the
+    largest pin force.
 
-    The reactions at the shoulder follow from the forces on lower and inner link; the base is left to prove them.
+    The reactions at the shoulder follow from the forces on lower and inner link; the base is left
+    to prove them.
     """
     forward, up = np.array([np.cos(q[0]), np.sin(q[0]), 0.0]), np.array([0.0, 0.0, 1.0])
     plane, normal = np.array([forward, up]), np.cross(forward, up)
@@ -292,7 +296,8 @@ def replace_friction(boom: Boom, viscous: tuple[float, ...], coulomb: tuple[floa
 
 
 def test_drive_inertia_adds_the_reflected_inertia_of_the_drives():
-    """160^2 x 5.76e-4 kg m^2 on joints 2 and 3 (errata, reflected inertia); the others have no drive."""
+    """160^2 x 5.76e-4 kg m^2 on joints 2 and 3 (errata, reflected inertia); the others have no
+    drive."""
     boom = Boom.load()
     states = random_states(boom, 5, np.random.default_rng(20))
     without, driven = inverse_dynamics(boom, *states), inverse_dynamics(boom, *states, drive_inertia=True)

@@ -1,4 +1,5 @@
-"""Mass matrix, bias, energies and forward dynamics against MuJoCo, Pinocchio, each other and differences."""
+"""Mass matrix, bias, energies and forward dynamics against MuJoCo, Pinocchio, each other and
+differences."""
 
 from collections.abc import Callable
 from dataclasses import fields

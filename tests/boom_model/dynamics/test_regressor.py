@@ -1,4 +1,5 @@
-"""The regressor against inverse dynamics and Pinocchio's regressor carried through the loop; parameters and bodies."""
+"""The regressor against inverse dynamics and Pinocchio's regressor carried through the loop;
+parameters and bodies."""
 
 from dataclasses import replace
 
@@ -42,7 +43,8 @@ def rank(Y: Array) -> int:
 
 
 def through_the_loop(boom: Boom, states: tuple[Array, Array, Array], base: BaseMotion | None) -> Array:
-    """G^T Y_tree of Pinocchio's joint torque regressor, (n, 5, 70): the payload is part of the end effector."""
+    """G^T Y_tree of Pinocchio's joint torque regressor, (n, 5, 70): the payload is part of the end
+    effector."""
     free = pinocchio_model(boom)
     model = free if base is not None else fixed_root(free)
     data, G = model.createData(), tree_matrix(boom)

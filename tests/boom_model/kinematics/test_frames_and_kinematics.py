@@ -1,5 +1,5 @@
-"""Frames of both loops, the closed forms and the motion of every body against each other, MuJoCo's tree, the textbook
-recursion, differences and the thesis."""
+"""Frames of both loops, the closed forms and the motion of every body against each other, MuJoCo's
+tree, the textbook recursion, differences and the thesis."""
 
 from dataclasses import fields
 
@@ -194,7 +194,8 @@ def on_the_yaw_axis() -> Array:
 
 
 def drawn_in_beyond_its_pin() -> Array:
-    """rho = 0, end effector along the actuator and inner link across it: all of the plane's columns are parallel."""
+    """rho = 0, end effector along the actuator and inner link across it: all of the plane's columns
+    are parallel."""
     return np.array([0.0, 0.4, 0.4 + np.pi / 2, -BOOM.geometry.L7, 0.0])
 
 
@@ -248,7 +249,8 @@ def joint_motion(t: Array) -> tuple[Array, Array, Array]:
 
 
 def vehicle_motion(t: Array) -> tuple[Array, Array, BaseMotion]:
-    """Pose of frame 1 in the ground, R (n, 3, 3) and p (n, 3), and its motion: rocking about an axis that rocks itself."""
+    """Pose of frame 1 in the ground, R (n, 3, 3) and p (n, 3), and its motion: rocking about an
+    axis that rocks itself."""
     first, second = np.array([2.0, -1.0, 2.0]) / 3.0, np.array([0.6, 0.8, 0.0])
     f, f1, f2 = 0.8 * np.sin(1.3 * t), 1.04 * np.cos(1.3 * t), -1.352 * np.sin(1.3 * t)
     g, g1, g2 = (x[:, None] * second for x in (0.5 * np.cos(0.9 * t), -0.45 * np.sin(0.9 * t), -0.405 * np.cos(0.9 * t)))

@@ -1,4 +1,5 @@
-"""Choice holds against dense scans of the whole family and closed forms; a pitch left free; targets given as transforms."""
+"""Choice holds against dense scans of the whole family and closed forms; a pitch left free; targets
+given as transforms."""
 
 import warnings
 from dataclasses import replace
@@ -45,7 +46,8 @@ SCAN = np.linspace(LIMITS.lower[1], LIMITS.upper[1], 2001)
 
 
 def cost(constraint: ChoosingConstraint, q: Array) -> Array:
-    """What a constraint says it makes least, (...) of q (..., 5), written down a second time; infinite outside the limits."""
+    """What a constraint says it makes least, (...) of q (..., 5), written down a second time;
+    infinite outside the limits."""
     span = LIMITS.upper - LIMITS.lower
     if isinstance(constraint, LeastExtension):
         value = q[..., 3]
@@ -119,7 +121,8 @@ def test_the_best_is_the_cheaper_side_of_the_base(constraint):
 
 
 def stretched(theta2: float, extension: float, yaw: float, wrist: float) -> Array:
-    """q (5,) whose inner link points at the wrist: inner link and the line from its tip to the wrist are one."""
+    """q (5,) whose inner link points at the wrist: inner link and the line from its tip to the
+    wrist are one."""
     return np.array([yaw, theta2, theta2 + np.pi - np.arctan2(GEOMETRY.L6, GEOMETRY.L7 + extension), extension, wrist])
 
 
@@ -307,7 +310,8 @@ def test_a_tilt_or_miss_within_the_tolerance_is_let_pass():
 @pytest.mark.parametrize("yaw", [1.0, 3.0])
 @pytest.mark.parametrize("away", [0.0, 5e-7], ids=["on it", "beside it"])
 def test_a_pose_on_the_yaw_axis_has_the_yaw_of_its_orientation(yaw, away):
-    """Beside the axis the tip misses the arm's plane by less than the tolerance, and its own place tells a wrong yaw."""
+    """Beside the axis the tip misses the arm's plane by less than the tolerance, and its own place
+    tells a wrong yaw."""
     q = np.array([yaw, np.radians(120.0), np.radians(125.0), 0.0, 0.0])
     forward = forward_kinematics(BOOM, [0.0, *q[1:4], np.pi - q[2]]).position[0]  # with the end effector down
     q[4] = np.pi - np.arcsin(forward / GEOMETRY.L8) - q[2]

@@ -1,4 +1,5 @@
-"""Every branch of the inverse kinematics: the thesis's table 2-7, there and back, and a solver that knows no branches."""
+"""Every branch of the inverse kinematics: the thesis's table 2-7, there and back, and a solver that
+knows no branches."""
 
 import cmath
 import re
@@ -145,7 +146,8 @@ def test_branches_are_within_limits_just_where_the_limits_hold(kind):
 
 
 def numeric_branches(position: Array, pitch: float, constraint: Constraint, rng: np.random.Generator) -> list[Array]:
-    """Every q that closes tip, pitch and constraint, by Newton's method from 40 random starts; to within whole turns."""
+    """Every q that closes tip, pitch and constraint, by Newton's method from 40 random starts; to
+    within whole turns."""
     g = GEOMETRY
 
     def residual(q: Array) -> tuple[float, ...]:
@@ -375,7 +377,8 @@ def test_the_actuators_elevation_is_the_same_after_whole_turns(turns):
 
 
 def two_ways(extension: float) -> tuple[Array, Array]:
-    """Two q (5,) within the limits, of one tip and the actuator horizontal: the inner link raised to 80 or 100 deg."""
+    """Two q (5,) within the limits, of one tip and the actuator horizontal: the inner link raised
+    to 80 or 100 deg."""
     inner, longer = np.radians([80.0, 100.0]), extension + 2 * np.cos(np.radians(80.0))
     return np.array([0.7, inner[0], np.pi, extension, 0.0]), np.array([0.7, inner[1], np.pi, longer, 0.0])
 

@@ -1,4 +1,5 @@
-"""Any finite target, under any constraint, has solutions or a reasoned refusal: no other exception, no NaN."""
+"""Any finite target, under any constraint, has solutions or a reasoned refusal: no other exception,
+no NaN."""
 
 import numpy as np
 import pytest
@@ -62,7 +63,8 @@ CONSTRAINTS = CONSTRAINTS | CHOICES
 
 
 def assert_sound(found: Solutions, position: tuple[float, float, float], constraint: Constraint) -> None:
-    """Every number is one; those within the limits reach the target and meet the constraint; the best is one of them."""
+    """Every number is one; those within the limits reach the target and meet the constraint; the
+    best is one of them."""
     assert np.isfinite(found.pitch)
     for solution in found.solutions:
         assert np.isfinite(solution.q).all()

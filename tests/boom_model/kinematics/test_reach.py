@@ -1,4 +1,5 @@
-"""The nearest reachable point on a target's line to the base, against closed forms and against finer scans of the line."""
+"""The nearest reachable point on a target's line to the base, against closed forms and against
+finer scans of the line."""
 
 from dataclasses import replace
 
@@ -24,7 +25,8 @@ def reached(position: Array, pitch: float, constraint: Constraint, within_limits
 
 
 def stretched(extension: float) -> Array:
-    """q (5,) with the inner link and the line from pin 8 to the wrist one straight line, the end effector down."""
+    """q (5,) with the inner link and the line from pin 8 to the wrist one straight line, the end
+    effector down."""
     inner = np.radians(2.0)
     lower = inner + np.pi - np.arctan2(BOOM.geometry.L6, BOOM.geometry.L7 + extension)
     return np.array([0.7, inner, lower, extension, np.pi - lower])

@@ -1,4 +1,5 @@
-"""A linkage of unequal links: the loop solved by a root finder, derivatives by differences, loads by energy."""
+"""A linkage of unequal links: the loop solved by a root finder, derivatives by differences, loads
+by energy."""
 
 from dataclasses import replace
 
@@ -145,7 +146,8 @@ def test_inverse_kinematics_reaches_its_targets(constraint):
 
 
 def test_the_best_member_is_the_best_of_a_dense_grid():
-    """Of all ways to reach a target within the limits of the unequal linkage, none has a shorter extension."""
+    """Of all ways to reach a target within the limits of the unequal linkage, none has a shorter
+    extension."""
     target = np.array([1.6, 0.2, 0.9])
     found = inverse_kinematics(UNEQUAL, target, -np.pi / 2.0, "least-extension")
     best = found.solutions[found.best].q

@@ -16,7 +16,8 @@ HEIGHT, FORCE, MOMENT = 0.05, 1e3, 1e3
 
 
 def least_mass_by_ipopt(beam: Beam, case: LoadCases, limits: Limits) -> tuple[float, np.ndarray]:
-    """Return mass [kg] and heights (n + 1,) of a cantilever whose one load case presses it together and down."""
+    """Return mass [kg] and heights (n + 1,) of a cantilever whose one load case presses it together
+    and down."""
     ((along, across),) = case.end_force
     own = beam.material.density * beam.width * beam.weights
     share, n = outboard_share(beam), beam.slices + 1

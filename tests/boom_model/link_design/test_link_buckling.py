@@ -1,4 +1,5 @@
-"""Critical loads of columns against closed forms, and of a tapered one against its differential equation."""
+"""Critical loads of columns against closed forms, and of a tapered one against its differential
+equation."""
 
 import numpy as np
 import pytest
@@ -45,7 +46,8 @@ def test_a_tapered_column_against_its_differential_equation():
     H = 0.05 - 0.04 * b.stations / LENGTH
 
     def end(P):
-        """Deflection at the pinned end of a column held at its root, under a unit lateral reaction there."""
+        """Deflection at the pinned end of a column held at its root, under a unit lateral reaction
+        there."""
 
         def rates(x, y):
             height = 0.05 - 0.04 * x / LENGTH
@@ -80,7 +82,8 @@ def test_element_matrices_lose_their_definiteness_at_the_critical_load(support, 
 
 
 def assembled(forms, H):
-    """The column's matrix over the slopes of its joints and its elements' mean slopes, which add up to no deflection."""
+    """The column's matrix over the slopes of its joints and its elements' mean slopes, which add up
+    to no deflection."""
     elements = len(forms.free)
     beyond = np.append(np.cumsum((forms.pressing * H)[::-1])[::-1][1:], 0.0)
     axial = 1.0 + beyond + forms.outboard * forms.pressing * H

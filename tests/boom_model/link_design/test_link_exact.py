@@ -1,4 +1,5 @@
-"""Least masses against a general solver, the closed form of the optimality conditions, bounds, and finite elements."""
+"""Least masses against a general solver, the closed form of the optimality conditions, bounds, and
+finite elements."""
 
 from dataclasses import replace
 
@@ -50,7 +51,8 @@ def random_problem(seed: int) -> Problem:
 
 
 def by_water_filling(problem: Problem):
-    """H_i = max(lower_i, (3 z C_i / a_i)^(1/4)), with z such that the one deflection is at its limit, by bisection."""
+    """H_i = max(lower_i, (3 z C_i / a_i)^(1/4)), with z such that the one deflection is at its
+    limit, by bisection."""
     C = problem.bending[0]
     low, high = 0.0, 1e12
 
@@ -154,7 +156,8 @@ def test_with_exact_stress_heights_it_is_lighter_still(old, own_mass):
 
 @pytest.mark.parametrize("seed", [1, 3, 5])
 def test_shear_joins_the_closed_form(seed):
-    """One deflection sum_i C_i / H_i^3 + D_i / H_i: each height by its own root, all at one multiplier."""
+    """One deflection sum_i C_i / H_i^3 + D_i / H_i: each height by its own root, all at one
+    multiplier."""
     rng = np.random.default_rng(seed)
     plain = random_problem(seed)
     p = replace(plain, bending=plain.bending[:1], shear=rng.uniform(0.0, 1.0, (1, plain.cost.size)) * 1e-2 / plain.cost.size)
@@ -293,7 +296,8 @@ def test_a_buckling_bound_is_close_and_below_every_link_that_holds_the_load():
 
 
 def test_heights_that_buckling_decides_are_smooth():
-    """Elements of several slices do not see waves within them: without a cost these are 3 mm high here."""
+    """Elements of several slices do not see waves within them: without a cost these are 3 mm high
+    here."""
     beam = Beam(1.0, 0.01, STEEL, slices=600)
     found = least_mass(beam, LOAD, replace(LIMITS, buckling_factor=8.0), own_mass=False)
     at = slice(10, 42)  # near the root, where buckling alone decides

@@ -11,7 +11,8 @@ LIMITS = {"stress_limit": 175e6, "deflection_limit": 0.01}
 
 
 def appendix_d(n: int, step: float, length=1.0, w=0.01, limit=175e6, most=0.01):
-    """Heights (n + 1,) of both stages from A to B, and the mass of each, with every slice and every candidate recomputed."""
+    """Heights (n + 1,) of both stages from A to B, and the mass of each, with every slice and every
+    candidate recomputed."""
     dx, rho, E = length / n, STEEL.density, STEEL.elastic_modulus
     fx, fy = THESIS_LOAD.applied
     a0, rate, spin = THESIS_LOAD.acceleration, THESIS_LOAD.angular_velocity, THESIS_LOAD.angular_acceleration
