@@ -56,7 +56,8 @@ def frequencies(boom: Boom, q: Array, stiffness: Array, inner_EI: float, extensi
         M[:] += (R_LINK_BODY[name] @ body.inertia @ R_LINK_BODY[name].T)[2, 2] * np.outer(angle, angle)
 
     def beam(nodes: list[tuple[Array, Array]], length: float, EI: float, densities: Array, drag: Array) -> None:
-        """Equal elements of `densities` (n,) [kg/m]; `drag` (size,) is the motion along the beam."""
+        """Equal elements of `densities` (n,) [kg/m]; `drag` (size,) is the motion
+        along the beam."""
         h = length / n
         H = np.diag([1.0, h, 1.0, h])
         bend = np.array([[12.0, 6.0, -12.0, 6.0], [6.0, 4.0, -6.0, 2.0], [-12.0, -6.0, 12.0, -6.0], [6.0, 2.0, -6.0, 4.0]])

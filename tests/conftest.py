@@ -14,7 +14,8 @@ from planner import cli  # imports NumPy, which reads the variable then
 
 @pytest.fixture
 def boom(tmp_path, monkeypatch, capsys):
-    """Runs the command in an empty folder; returns exit code, standard output and standard error."""
+    """Runs the command in an empty folder; returns exit code, standard output and
+    standard error."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments):

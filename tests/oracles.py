@@ -28,7 +28,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class TreeLink(NamedTuple):
-    """A body of the tree, on a joint along its own z axis; its frame is the one of `BODY_FRAMES`."""
+    """A body of the tree, on a joint along its own z axis; its frame is the one of
+    `BODY_FRAMES`."""
 
     body: str
     parent: str
@@ -427,7 +428,8 @@ def random_states(boom: Boom, count: int, rng: np.random.Generator) -> tuple[Arr
 
 
 def random_base(rng: np.random.Generator, *shape: int) -> BaseMotion:
-    """A base motion with entries (*shape, 3): any tilt, up to 5 in SI along each axis of frame 1."""
+    """A base motion with entries (*shape, 3): any tilt, up to 5 in SI along each axis
+    of frame 1."""
     return BaseMotion.of(
         velocity=rng.uniform(-3.0, 3.0, (*shape, 3)),
         angular_velocity=rng.uniform(-1.5, 1.5, (*shape, 3)),

@@ -49,7 +49,8 @@ class Experiment(NamedTuple):
 
 
 def perturbed(boom: Boom, rng: np.random.Generator) -> Boom:
-    """The boom with masses, first moments and second moments off by up to 10 %, and with friction."""
+    """The boom with masses, first moments and second moments off by up to 10 %, and
+    with friction."""
 
     def off(body: Body) -> Body:
         mass = body.mass * rng.uniform(0.9, 1.1)

@@ -162,7 +162,7 @@ take."""
 
 
 def test_a_whole_plan_takes_few_times_as_long_as_the_peers_law_alone():
-    """1.31, 1.40, 13.8 and 0.53 of the peer's time were seen, and a tenth more on a busy machine."""
+    """Seen: 1.31, 1.40, 13.8 and 0.53 of the peer's time; a tenth more on a busy machine."""
     jobs = {"peer": (peers(BOOM), 1.0), **WHOLE}
     best = dict.fromkeys(jobs, np.inf)
     for _ in range(ROUNDS):
@@ -177,7 +177,8 @@ def test_a_whole_plan_takes_few_times_as_long_as_the_peers_law_alone():
 
 
 def test_motions_of_the_main_move_take_their_share_of_the_peers_time_at_most():
-    """Under 24 kg, where the drives decide, 4.4 was seen for both laws that keep the jerk limits."""
+    """Under 24 kg, where the drives decide, 4.4 was seen for both laws that keep the
+    jerk limits."""
     runs = {name: lambda timing=timing: timed(BOOM, [PATH], timing, None) for name, timing in TIMINGS.items()}
     runs["peer"] = peers(BOOM)
     best = dict.fromkeys(runs, np.inf)

@@ -229,7 +229,8 @@ GUESS = Origin(Basis.ASSUMED, "a guess")
 
 
 def test_friction_enters_the_checks_both_ways_and_is_said_to_be_assumed():
-    """The reversed row is the forward row of the motion run backwards, whose friction turns round."""
+    """The reversed row is the forward row of the motion run backwards, whose friction
+    turns round."""
     motion = replace(plan(BOOM, "transport", "phenotyping").trajectory, planned=None)
     back = Trajectory.from_samples(motion.t, motion.q[::-1], -motion.qd[::-1], motion.qdd[::-1])
     there, again = check(rough_boom(), motion), check(rough_boom(), back)

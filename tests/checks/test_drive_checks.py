@@ -251,7 +251,8 @@ def test_dwell_of_ramps_is_exact_between_samples():
 
 
 def test_the_motor_can_break_the_gearbox():
-    """7.2 x 160 x 0.65 = 749 Nm; 460 Nm is passed at 4.42 Nm, with the better mesh at 460 / (160 x 0.8713) + 0.42 = 3.72."""
+    """7.2 x 160 x 0.65 = 749 Nm; 460 Nm is passed at 4.42 Nm, with the better mesh at
+    460 / (160 x 0.8713) + 0.42 = 3.72."""
     found = row(motor_rows(joint_view(), DRIVE), "motor against gearbox")
     assert (found.demand, found.limit, found.verdict) == (pytest.approx(748.8), 460.0, Verdict.WARN)
     assert "limit its current to 52% (4.9 A), 3.72 Nm at the motor" in found.source

@@ -1,4 +1,5 @@
-"""Elastic joints, bending links and friction: closed forms, energy, finite elements, differences."""
+"""Elastic joints, bending links and friction: closed forms, energy, finite elements,
+differences."""
 
 from dataclasses import replace
 

@@ -1,4 +1,5 @@
-"""A tab of the page without a browser: it speaks the protocol of viser's client over a WebSocket."""
+"""A tab of the page without a browser: it speaks the protocol of viser's client over
+a WebSocket."""
 
 import re
 import time

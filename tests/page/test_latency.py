@@ -43,7 +43,8 @@ def _echo(page, tab):
 
 
 def _element(tab, name):
-    """The place of the view that holds an identifier; looking at it costs the measurement nothing."""
+    """The place of the view that holds an identifier; looking at it costs the
+    measurement nothing."""
     return next(each for each in tab.elements.values() if f'id="{name}"' in (each.get("content") or ""))
 
 

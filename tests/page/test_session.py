@@ -1,4 +1,5 @@
-"""Tabs of a running page, without a browser: displayed numbers, events, jobs, and who may reach it."""
+"""Tabs of a running page, without a browser: displayed numbers, events, jobs, and who
+may reach it."""
 
 import socket
 import time

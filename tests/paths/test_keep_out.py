@@ -161,7 +161,8 @@ def test_a_pose_too_near_to_a_shape_is_refused_with_link_shape_and_distance():
 
 
 def test_no_way_round_is_refused_with_what_is_in_the_way():
-    """A lane between two walls of any height, one side of the vehicle to be reached from the other."""
+    """A lane between two walls of any height, one side of the vehicle to be reached
+    from the other."""
     walls = [Box(f"wall {k}", np.array([x, 0.0, 0.0]), np.array([4.0, 3.0, 20.0]), ORIGIN) for k, x in enumerate((2.25, -2.25))]
     start, goal = (np.array([yaw, 0.5, 2.6, 0.3, 0.0]) for yaw in (np.pi / 2.0, 3.0 * np.pi / 2.0))
     sentence = r"no detour was found; at \d+\.\d% of the straight joint move the .* wall 1; the required clearance is 50 mm"

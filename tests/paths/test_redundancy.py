@@ -112,7 +112,8 @@ def test_least_time_is_the_quickest(number):
 
 
 def test_the_line_that_took_two_minutes():
-    """Chosen point by point it kinked: 125 s, and 1.025 times the extension's acceleration limit."""
+    """Chosen point by point it kinked: 125 s, and 1.025 times the extension's
+    acceleration limit."""
     spec = MoveSpec.of(
         "tip=0.21512145055781914,0.4335041929437723,0.9817923251312756",
         "tip=1.3555020461096687,0.32453656057613717,0.0362866059247251",

@@ -1,4 +1,5 @@
-"""`boom study`: its answer, its files, and what it says where a library or every sample is missing."""
+"""`boom study`: its answer, its files, and what it says where a library or every
+sample is missing."""
 
 import builtins
 import json

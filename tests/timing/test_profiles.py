@@ -139,7 +139,8 @@ def test_jerk_bounded_time_optimal_is_ruckigs_optimum_on_a_straight_path_without
 
 
 def test_jerk_bound_keeps_the_path_the_jerk_limits_and_the_rest():
-    """The jerk by differences of the positions alone, under a payload with which the drives decide."""
+    """The jerk by differences of the positions alone, under a payload with which the
+    drives decide."""
     boom = BOOM.with_payload(20.0)
     start, goal = boom.pose("transport"), boom.pose("phenotyping")
     motion = straight(boom, start, goal, Profile.TIME_OPTIMAL, jerk_bound=True)

@@ -44,7 +44,8 @@ class Case(NamedTuple):
 
     @property
     def duration_without_drives(self) -> float:
-        """A trapezoid or a triangle of s', the optimum where velocity and acceleration alone count."""
+        """A trapezoid or a triangle of s', the optimum where velocity and
+        acceleration alone count."""
         span = np.abs(self.goal - self.start)
         v, a = (np.min(limit / span) for limit in (self.boom.limits.velocity, self.boom.limits.acceleration))
         return 1.0 / v + v / a if v * v < a else 2.0 / np.sqrt(a)
@@ -96,7 +97,8 @@ def lost(move: Move, optimum: float) -> float:
 
 @pytest.mark.parametrize("number", range(len(CASES)))
 def test_duration_is_the_optimum(number):
-    """0.51 % lost at most, by limits held at both ends of each of the planner's steps; 0.01 % where drives do not decide."""
+    """0.51 % lost at most, by limits held at both ends of each of the planner's steps; 0.01 % where
+    drives do not decide."""
     move, ratios = planned_with_ratios(number)
     assert -FASTER < lost(move, optimum(number)) < SLOWER
     assert_kept(ratios)

@@ -61,7 +61,8 @@ def test_without_the_printed_curve_there_is_no_wind_up(name):
 
 
 def test_wind_up_moves_the_tip_as_forward_kinematics_says():
-    """To first order: what is left goes with the square of the angles, some 2e-3 rad, times 2.5 m."""
+    """To first order: what is left goes with the square of the angles, some 2e-3 rad,
+    times 2.5 m."""
     q, tau = random_states(200, seed=1)
     turned = q.copy()
     for i in (1, 2):

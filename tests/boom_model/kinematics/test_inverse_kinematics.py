@@ -39,7 +39,8 @@ def separation(q: Array, other: Array) -> Array:
 
 
 def misses(q: Array, position: Array, pitch: Array | float) -> Array:
-    """How far each branch (..., 5) is from its target: the larger of metres, and radians of pitch."""
+    """How far each branch (..., 5) is from its target: the larger of metres, and
+    radians of pitch."""
     tip = forward_kinematics(BOOM, q)
     return np.maximum(np.linalg.norm(tip.position - position, axis=-1), np.abs(turned(tip.pitch - pitch)))
 
@@ -99,7 +100,8 @@ def test_down_and_horizontal_unless_told_otherwise():
 
 
 def reachable(kind: type[Constraint], groups: int, size: int, seed: int) -> list[tuple[Array, Constraint]]:
-    """Groups of q (size, 5) within the limits, each group with one constraint that all of it meets."""
+    """Groups of q (size, 5) within the limits, each group with one constraint that
+    all of it meets."""
     rng = np.random.default_rng(seed)
     drawn = []
     for _ in range(groups):
