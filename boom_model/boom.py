@@ -47,7 +47,7 @@ IS_LENGTH = read_only([0, 0, 0, 1, 0]).astype(bool)
 
 
 def in_degrees(q: ArrayLike) -> Array:
-    """Return joint positions or rates (..., 5) [rad, m] for people: degrees, the extension in metres."""
+    """Return joint positions or rates (..., 5) [rad, m] in degrees, the extension in metres."""
     shown: Array = np.where(IS_LENGTH, q, np.degrees(q))
     return shown
 
@@ -247,7 +247,7 @@ class Friction:
         return torque
 
     def dry(self, direction: ArrayLike) -> Array:
-        """Return the part that does not grow with speed, for directions -1, 0 or 1 of motion (..., 5)."""
+        """Return the part that does not grow with speed, for directions -1, 0 or 1 (..., 5)."""
         direction = np.asarray(direction, dtype=float)
         torque: Array = self.coulomb * direction + self.asymmetric * np.abs(direction)
         return torque

@@ -1,4 +1,4 @@
-"""Provenance of a value: measured, printed in a source, estimated from printed values, or assumed."""
+"""Provenance of a value: measured, printed, estimated from printed values, or assumed."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

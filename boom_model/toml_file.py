@@ -1,4 +1,4 @@
-"""TOML files: reading into a pydantic schema, with errors that name the file and the key; editing."""
+"""TOML files: read by a pydantic schema, with errors that name file and key; edited."""
 
 import tomllib
 from pathlib import Path

@@ -75,7 +75,7 @@ def unknown(kind: str, name: object, known: Iterable[str], other: str = "") -> I
 
 
 def nearest_name(given: str, known: Iterable[str]) -> str | None:
-    """Return the known name that is most like the one given, whatever its case; None if none is like it."""
+    """Return the known name that is most like the one given, whatever its case, or None."""
     from difflib import get_close_matches
 
     names = {name.lower(): name for name in known}

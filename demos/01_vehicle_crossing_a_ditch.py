@@ -1,9 +1,9 @@
-"""The boom opens while its tractor crosses ditches: what reaches the mount and the drives, and what the vehicle's share is.
+"""The boom opens while its tractor crosses ditches: what reaches mount and drives.
 
     python3 demos/01_vehicle_crossing_a_ditch.py [OUT.rrd]
 
-Look at the recording with `boom view ditch.rrd`: the tab "Torque parts" shows the vehicle's share of each torque, "Mount"
-the wrench on the mount.
+Look at the recording with `boom view ditch.rrd`: the tab "Torque parts" shows the vehicle's share
+of each torque, "Mount" the wrench on the mount.
 """
 
 import sys

@@ -1,9 +1,10 @@
-"""One tip target, five joints: the constraint makes the answer determinate, and each constraint has branches of its own.
+"""One tip target, five joints: each constraint has branches of its own.
 
     python3 demos/02_inverse_kinematics_and_its_branches.py
 
-Learn: a target with a pitch leaves one freedom. A constraint takes it away and leaves up to four branches, each with the limits
-that it breaks; a constraint that chooses looks over the whole family, and says how good its choice is.
+Learn: a target with a pitch leaves one freedom. A constraint takes it away and leaves up to four
+branches, each with the limits that it breaks; a constraint that chooses looks over the whole
+family, and says how good its choice is.
 """
 
 import numpy as np

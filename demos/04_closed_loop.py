@@ -1,9 +1,10 @@
-"""The same move with three controllers: how far the tip is off, what shakes at the end, and what a shaper makes of it.
+"""The same move with three controllers: how far the tip is off, and what shakes at the end.
 
     python3 demos/04_closed_loop.py [OUT.rrd]
 
-Look at the recording with `boom view closed_loop.rrd`: the tab "Tip error" holds the cases side by side, a tab a case its
-joints: commanded and actual position, error, and the torque beside what the motor has.
+Look at the recording with `boom view closed_loop.rrd`: the tab "Tip error" holds the cases side by
+side, a tab a case its joints: commanded and actual position, error, and the torque beside what the
+motor has.
 """
 
 import sys

@@ -1,10 +1,11 @@
-"""A move is measured, and held against its plan: what is error, what is delay, and what is only the encoders' noise.
+"""A measured move against its plan: what is error, what is delay, and what is noise.
 
     python3 demos/05_plan_and_reality.py [OUT.rrd]
 
-No boom stands here, so the log is made up: the plan, 15 ms late, with 0.1 deg of play at the inner joint, seeded noise of the
-encoders, and a clock that started 3.2 s earlier. It is left in log.csv, the plan in plan.csv: the command does the same with
-`boom compare plan.csv log.csv --offset -3.2 --out both.rrd`.
+No boom stands here, so the log is made up: the plan, 15 ms late, with 0.1 deg of play at the inner
+joint, seeded noise of the encoders, and a clock that started 3.2 s earlier. It is left in log.csv,
+the plan in plan.csv: the command does the same with `boom compare plan.csv log.csv --offset -3.2
+--out both.rrd`.
 """
 
 import sys

@@ -1,9 +1,9 @@
-"""The tip sweeps 2 m straight over a plot, the sensors facing down, and the joints do what that takes.
+"""The tip sweeps 2 m straight over a plot, the sensors facing down.
 
     python3 demos/06_a_straight_sweep_over_the_plot.py [OUT.rrd]
 
-Learn: the tip keeps its line to a hundredth of a millimetre; what the sweep costs depends on the constraint; a line
-that leaves the workspace says where.
+Learn: the tip keeps its line to a hundredth of a millimetre; what the sweep costs depends on the
+constraint; a line that leaves the workspace says where.
 """
 
 import sys

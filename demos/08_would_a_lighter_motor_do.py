@@ -1,4 +1,4 @@
-"""The thesis's question: with half the inner link, or a lighter payload, would a lighter motor do, and what would it save?
+"""The thesis's question: with a lighter link or payload, would a lighter motor do?
 
     python3 demos/08_would_a_lighter_motor_do.py [OUT.png]
 

@@ -1,4 +1,4 @@
-"""Calibrate a machine: a simulated boom, made a little wrong, is measured with a tracker and found out.
+"""Calibrate a machine: a simulated boom, made a little wrong, is measured and found out.
 
 The true boom has lengths that are off by 2 to 3 mm and zeros that are off by half a degree. The
 tracker stands anywhere and measures to 0.5 mm. One of its targets was knocked. The script writes

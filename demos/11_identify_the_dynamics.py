@@ -1,9 +1,10 @@
-"""Masses and friction from a measured motion: what the boom's file gets wrong, and what the log can tell.
+"""Masses and friction from a measured motion, and what the log can tell of them.
 
     python3 demos/11_identify_the_dynamics.py
 
-No boom stands here, so the log is made up: a boom whose inner link is 8 % heavier and whose joints rub, encoders with 0.01 deg
-of noise and torques with 1 Nm. It is left in excited.csv, and the motion in excite.csv: `boom identify excited.csv --payload 0
+No boom stands here, so the log is made up: a boom whose inner link is 8 % heavier and whose joints
+rub, encoders with 0.01 deg of noise and torques with 1 Nm. It is left in excited.csv, and the
+motion in excite.csv: `boom identify excited.csv --payload 0
 --out measured.toml` does the same.
 """
 

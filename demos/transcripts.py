@@ -89,7 +89,7 @@ def run(command: str, folder: str) -> str:
 
 
 def words(text: str) -> str:
-    """Return a page without what may differ between processors: digits, and the width of columns."""
+    """Return a page without what may differ between processors: digits and columns' widths."""
     return re.sub(r"[─\s]+", " ", re.sub(r"-?\d[\d.e+-]*", "#", text))
 
 

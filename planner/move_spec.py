@@ -90,7 +90,7 @@ class MoveSpec:
             InputError: a word is unknown, a number is malformed or out of range, or there would be
                 too many samples.
 
-        >>> MoveSpec.of("transport", "tip=1.4,0,1.0", profile="time-optimal", constraint="least-torque").profile
+        >>> MoveSpec.of("transport", "tip=1.4,0,1.0", profile="time-optimal").profile
         TimeOptimal(jerk_bound=False, average_torque=False)
         """
         timing = Timing.of(profile, duration, rate=rate)

@@ -232,7 +232,7 @@ _PER_UNIT = {
 
 
 def _in_si(table: Table, kind: type) -> dict[str, Any]:
-    """Return the numbers of a table in SI, by the names of `kind`'s fields: the keys without their units."""
+    """Return the numbers of a table in SI, by the names of `kind`'s fields."""
     found: dict[str, Any] = {}
     names = {field.name for field in fields(kind)}
     for key, value in table:

@@ -42,7 +42,7 @@ def load_current(drive: Drive, torque: ArrayLike) -> Array | None:
 
 
 def copper_per_torque(drive: Drive) -> float | None:
-    """Return r [W/Nm^2] of the copper loss r T^2 at a motor torque T with `load_current`; None as there."""
+    """Return r [W/Nm^2] of the copper loss r T^2 at a motor torque T; None as in `load_current`."""
     current = load_current(drive, 1.0)
     if current is None or drive.winding is None:
         return None
@@ -68,7 +68,7 @@ class ShaftPower:
 
 
 def shaft_power(drive: Drive, tau: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> ShaftPower | None:
-    """Return the power at the motor's shaft for joint torque [Nm], velocity [rad/s] and acceleration.
+    """Return the power at the motor's shaft for joint torque [Nm], velocity and acceleration.
 
     The arrays broadcast. Return None if `motor_torque` has no figure.
     """

@@ -53,7 +53,8 @@ def targets_at(boom: Boom, position: Array, pitch: Array | float, side: Array | 
         boom: the boom.
         position: of the tip in frame 1 [m].
         pitch: [rad]
-        side: 1 where the yaw points towards the tip, -1 where the arm reaches over the base; it broadcasts.
+        side: 1 where the yaw points towards the tip, -1 where the arm reaches over the base; it
+            broadcasts.
     """
     g = boom.geometry
     x, y, z = np.moveaxis(position, -1, 0)
@@ -124,7 +125,7 @@ def _ends(boom: Boom, targets: Targets, constraint: ChoosingConstraint) -> Array
 
 
 def _with_boundaries(boom: Boom, targets: Targets, ends: Array) -> Array:
-    """Return candidate values of theta2 with those where a limit of the lower link is reached, by bisection."""
+    """Return candidate values of theta2 with those where the lower link reaches a limit."""
     limits = boom.limits
     grid = np.broadcast_to(np.linspace(limits.lower[1], limits.upper[1], _GRID), (len(ends), _GRID))
     theta2 = np.sort(np.concatenate([ends, grid], axis=-1), axis=-1)

@@ -125,7 +125,7 @@ def jacobian_rate(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
 
 
 def _actuator_jacobian_rate(boom: Boom, q: Array, qd: Array) -> Array:
-    """Return the time derivative of `_actuator_jacobian` at the same coordinates and their rates."""
+    """Return the time derivative of `_actuator_jacobian` at coordinates and their rates."""
     g = boom.geometry
     v1, v2, v3, v4, _ = np.moveaxis(qd, -1, 0)
     rho, vt = g.L7 + q[..., 3], qd[..., 2] + qd[..., 4]

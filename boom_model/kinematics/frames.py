@@ -107,7 +107,7 @@ def dh_rows(boom: Boom, q: ArrayLike, loop: Loop) -> Array:
 
 
 def theta_motion(boom: Boom, q: Array, qd: Array, qdd: Array, loop: Loop) -> tuple[Array, Array]:
-    """Return the first and second time derivatives (..., 10) of the angles theta_i of all rows of one loop."""
+    """Return the first and second time derivatives (..., 10) of theta_i of all rows of a loop."""
     known = THETA_RATES[loop].T
     spin, spin_up = qd @ known, qdd @ known
     if boom.geometry.is_parallelogram:

@@ -79,7 +79,7 @@ def require_closed(boom: Boom, q: Array) -> Array:
 
 
 def rates(boom: Boom, q: Array, qd: Array) -> Directions:
-    """Return the rates of psi and chi [rad/s] at joint velocities qd (..., 5), from the loop's first derivative."""
+    """Return the rates of psi and chi [rad/s] at joint velocities qd (..., 5)."""
     if boom.geometry.is_parallelogram:
         return Directions(qd[..., 2], qd[..., 1])
     at = directions(boom, q[..., 1], q[..., 2])
@@ -103,7 +103,7 @@ def accelerations(boom: Boom, q: Array, qd: Array, qdd: Array) -> Directions:
 
 
 def length_derivatives(boom: Boom, q: Array) -> Array:
-    """Return the derivative of psi (..., 4) by L3, L4, L5 and L9 [rad/m] at constant theta2 and theta3."""
+    """Return d psi/d (L3, L4, L5, L9) (..., 4) [rad/m] at constant theta2 and theta3."""
     g, at = boom.geometry, directions(boom, q[..., 1], q[..., 2])
     moved = (np.cos(at.outer - q[..., 2]), np.ones_like(at.outer), -np.cos(at.outer - at.upper), -np.cos(at.outer - q[..., 1]))
     slope: Array = np.stack(moved, axis=-1) / (g.L5 * np.sin(at.outer - at.upper))[..., None]
@@ -111,7 +111,7 @@ def length_derivatives(boom: Boom, q: Array) -> Array:
 
 
 def _pull(g: Geometry, q: Array, at: Directions, rate: Array) -> Directions:
-    """Return what the lower and the inner link's turning takes, across the outer and across the upper link."""
+    """Return what the turning lower and inner links take, across the outer and upper link."""
     across = [
         g.L3 * np.sin(along - q[..., 2]) * rate[..., 2] - g.L9 * np.sin(along - q[..., 1]) * rate[..., 1]
         for along in (at.outer, at.upper)
@@ -125,7 +125,7 @@ def _solved(g: Geometry, q: Array, at: Directions, pull: Directions) -> Directio
 
 
 def _handed(delta: Array) -> Array:
-    """Return +1 where the loop is assembled with theta3 ahead of theta2 by less than half a turn, else -1."""
+    """Return +1 where theta3 is ahead of theta2 by less than half a turn, else -1."""
     return np.where(np.sin(delta) >= 0.0, 1.0, -1.0)
 
 

@@ -128,8 +128,8 @@ def reach_map(
         z: (m,) likewise.
 
     Raises:
-        InputError: pitch, r or z is not finite, r or z is not an ascending vector, or constraint is not a
-            constraint.
+        InputError: pitch, r or z is not finite, r or z is not an ascending vector, or constraint is
+            not a constraint.
     """
     pitch = scalar("pitch", pitch)
     r, z = (

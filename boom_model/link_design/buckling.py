@@ -1,4 +1,4 @@
-"""Column buckling of a link: the thesis's formula for a prism, and the eigenvalue of the tapered column.
+"""Column buckling of a link: the thesis's formula, and the eigenvalue of the tapered column.
 
 A column under the end load P and the axial load n of its own body force buckles where
 
@@ -70,11 +70,11 @@ def critical_load(beam: Beam, H: Array, axial_acceleration: Array, plane: Plane 
 
 @dataclass(frozen=True, eq=False)
 class ColumnForms:
-    """A column that must hold an end load out of the plane, as matrices that are linear in the heights.
+    """Column that must hold an end load out of the plane, by matrices linear in the heights.
 
-    Each element has four coordinates, in this order: the deflection of its near end, the slope there,
-    its mean slope, and the slope of its far end. Its matrix is bending . H - axial . (1 + n), with n
-    the axial load of the body force at the stations, relative to the end load.
+    Each element has four coordinates: deflection and slope of its near end, its mean slope, and the
+    slope of its far end. Its matrix is bending . H - axial . (1 + n), with n the axial load of the
+    body force at the stations, relative to the end load.
 
     The column holds the end load where all elements together are positive semidefinite. They are if
     for each joint there is a symmetric (2, 2) matrix of its deflection and slope such that every
@@ -100,7 +100,7 @@ class ColumnForms:
 
 
 def column_forms(beam: Beam, axial_acceleration: Array, end_load: float) -> ColumnForms:
-    """Build the matrices of a column that must hold an end load [N] above 0 and its own body force."""
+    """Build the matrices of a column that must hold an end load > 0 [N] and its body force."""
     from scipy.sparse import csr_array
 
     mesh, n = _Mesh.of(beam), beam.slices

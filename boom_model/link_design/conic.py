@@ -292,12 +292,12 @@ def _add_column(program: _Program, forms: ColumnForms, unit: Array, first: int) 
 
 
 def _column_slope(forms: ColumnForms, dual: Array) -> tuple[Array, float]:
-    """Return slope and constant of a column in the Lagrangian, from the multipliers of its elements.
+    """Return slope and constant of a column in the Lagrangian, by its elements' multipliers.
 
     For any deflection v that the supports allow, heights that hold the load fulfil
     v . K(H) v >= v . G v, which is linear in them. The multipliers are nearly those of one v: the
     largest eigenvectors of the elements, joined. Slopes at the joints and mean slopes are a
-    deflection if the mean slopes add up to 0. So the bound is valid however good the multipliers are.
+    deflection if the mean slopes add up to 0. So the bound is valid, however good the multipliers.
     """
     packed = np.zeros(10 * len(forms.free))
     kept = _entries(forms)

@@ -97,7 +97,7 @@ def check_feasible(problem: Problem) -> None:
 
 
 def excess(problem: Problem, H: Array) -> float:
-    """Return the largest relative violation of upper heights, tapers and deflections; below 0: none."""
+    """Return the largest relative violation of heights, tapers, deflections; none below 0."""
     found = [float((H / problem.upper).max()), float(problem.deflections(H).max(initial=0.0))]
     if problem.taper is not None:
         found.append(float((np.abs(np.diff(H)) / problem.taper).max()))
@@ -113,14 +113,14 @@ def separable_least(cost: Array, bending: Array, shear: Array, lower: Array, upp
 
 
 def lower_multipliers(problem: Problem, m: Multipliers) -> Array:
-    """Return the multipliers (n,) of the lower heights: the Lagrangian's slope there, where above 0."""
+    """Return the multipliers (n,) of the lower heights: the Lagrangian's slope, where above 0."""
     p, z = problem, m.deflections
     rise = p.cost + m.slope - 3.0 * (z @ p.bending) / p.lower**4 - (z @ p.shear) / p.lower**2
     return np.maximum(rise, 0.0)
 
 
 def convex_share(cost: Array, slope: Array) -> float:
-    """Return the largest share (at most 1) of a slope that leaves every cost + slope at 0 or above."""
+    """Return the largest share, at most 1, of a slope that leaves cost + slope at 0 or above."""
     return min(1.0, float((cost / np.maximum(-slope, 1e-300)).min()))
 
 

@@ -100,7 +100,7 @@ class StressTerm(NamedTuple):
 
 
 class Search:
-    """The convex problem at given forces and prices, with the constraints found to matter so far."""
+    """Convex problem at given forces and prices, with the constraints that matter so far."""
 
     def __init__(self, beam: Beam, cases: LoadCases, limits: Limits, *, shear: bool) -> None:
         self.beam, self.cases, self.limits, self.shear = beam, cases, limits, shear
@@ -150,10 +150,10 @@ class Search:
             H = near = found.heights
 
     def price(self, H: Array, forces: Forces, found: Optimum) -> Array:
-        """Return the price (n + 1,) of each height: its mass, and what its inertia adds to the forces.
+        """Return the price (n + 1,) of each height: its mass, and what its inertia adds.
 
-        Where the inertia saves more than the mass costs, heights would grow without end. They keep a
-        small price there.
+        Where the inertia saves more than the mass costs, heights would grow without end. They keep
+        a small price there.
         """
         stress = self.stress(H, forces, found)
         used = np.unique([*self.deflecting, *stress.governing[stress.slope < 0.0]]).astype(int)

@@ -1,4 +1,4 @@
-"""Power and energy of a motion: at the joints, in the windings, at the drivers and from the supply."""
+"""Power and energy of a motion: at joints, in windings, at drivers and from the supply."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -70,7 +70,7 @@ ASSUMED_SUPPLY = Supply()
 
 @dataclass(frozen=True, eq=False)
 class JointPower:
-    """Power of one joint over the samples of a motion, arrays (n,) [W]; None where the drive has no data."""
+    """Power of one joint over the samples, arrays (n,) [W]; None where the drive has no data."""
 
     joint: str
     output: Array
@@ -162,7 +162,7 @@ class JointEnergy:
 
 @dataclass(frozen=True)
 class Balance:
-    """Work of the joint torques, and where it goes [J]: work = kinetic + potential + friction + residual."""
+    """Work of the joint torques [J]: work = kinetic + potential + friction + residual."""
 
     work: float
     kinetic: float

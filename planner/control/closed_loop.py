@@ -141,7 +141,7 @@ class Case:
         return self.gains[0].controller
 
     def place(self, t: ArrayLike) -> tuple[NDArray[np.intp], Array]:
-        """Return the index of the design before times t (...), and the fraction of the way to the next."""
+        """Return the index of the design before times t (...), and the way to the next (0 to 1)."""
         last = len(self.gains) - 1
         along = np.clip(np.asarray(t) / max(self.command.duration, 1e-9), 0.0, 1.0) * last
         before = np.minimum(along.astype(np.intp), max(last - 1, 0))
@@ -376,7 +376,7 @@ def _table(plant: Plant, boom: Boom, commands: Sequence[Command], t: Array, tilt
 
 
 def _schedule(cases: Sequence[Case], t: Array) -> Callable[[int], Array]:
-    """Return a function of the index of t: Kp, Kd and Ki (3, S, 5, 5) of S cases, as `Case.gains_at`."""
+    """Return a function of the index of t: Kp, Kd, Ki (3, S, 5, 5) of S cases."""
     most = max(len(case.gains) for case in cases)
     knots = np.empty((3, len(cases), most, 5, 5))
     for s, case in enumerate(cases):

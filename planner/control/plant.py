@@ -184,7 +184,7 @@ class Plant:
 
 
 def quick_index(indices: Sequence[int]) -> slice | list[int]:
-    """Return increasing indices as a slice if they are evenly spaced, which NumPy indexes faster."""
+    """Return evenly spaced indices as a slice, which NumPy indexes faster, others as given."""
     if not indices:
         return slice(0)
     step = indices[1] - indices[0] if len(indices) > 1 else 1

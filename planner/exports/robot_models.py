@@ -13,7 +13,8 @@ stay parallel to the base. Thus each of the pins 6 and 7 consists of two joints,
 follows a single joint:
 
     mount -yaw- base -inner- inner
-                base -lower- lower -pin 6- outer -pin 7- upper -extension- extension -wrist- end_effector - tip
+                base -lower- lower -pin 6- outer -pin 7- upper
+                upper -extension- extension -wrist- end_effector - tip
 
 Let G be the matrix of the <mimic> multipliers, so that the tree's coordinates are x = G q. The
 joint torques of the linkage are tau = G^T tau_tree: a torque that a tool computes for a mimic joint
@@ -118,7 +119,8 @@ def mjcf(boom: Boom) -> str:
     coupled limit prevents this at lower = inner. Nothing prevents it at lower - inner = 180 deg.
 
     Raises:
-        InputError: the linkage has unequal links, or a moving body has no mass or no inertia, which MuJoCo cannot simulate.
+        InputError: the linkage has unequal links, or a moving body has no mass or no inertia, which
+            MuJoCo cannot simulate.
     """
     boom.geometry.require_parallelogram("an MJCF")
     for name, body in boom.bodies.items():

@@ -1,4 +1,4 @@
-"""What a link is designed for: the options of `boom link`, the task of a study, and Python's arguments."""
+"""What a link is designed for; the options of `boom link` are its fields."""
 
 from dataclasses import dataclass, replace
 from enum import StrEnum

@@ -1,4 +1,4 @@
-"""Units of a motion's file: a file in degrees, millimetres or milliseconds is refused with the guess."""
+"""Units of a motion's file: degrees, millimetres, milliseconds are refused with the guess."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The interactive page: one frozen state, views as pure functions of it, and a server on the loopback address.
+"""The interactive page: a frozen state, views as pure functions of it, and a local server.
 
 The page knows no physics: every number is taken from `boom_model` and the rooms below.
 """

@@ -1,4 +1,4 @@
-"""Files that the page saves: recording, motion, report, mission, and what a command needs beside it."""
+"""Files that the page saves: recording, motion, report, mission, and a command's files."""
 
 import tempfile
 from collections.abc import Callable, Mapping
@@ -93,7 +93,7 @@ def mission_file(state: State) -> str:
 
 
 def boom_file(state: State) -> str:
-    """Return the boom's file with the drives and limits of the page; all else, comments too, as it was.
+    """Return the boom's file with the page's drives and limits, and all else as it was.
 
     Raises:
         InputError: the file cannot be read any more.

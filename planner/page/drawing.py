@@ -1,4 +1,4 @@
-"""The boom in 3D, as a recording draws it: solids, arrows, path of the tip, workspace, and the gizmo of the target."""
+"""The boom in 3D, as a recording draws it, with workspace and the gizmo of the target."""
 
 from typing import Any
 
@@ -78,7 +78,7 @@ class Drawing:
         self.gizmo.position = np.array(position)
 
     def show_path(self, planned: Planned | None) -> None:
-        """Show the path of the tip of a planned move, coloured by the largest share of a drive's limit."""
+        """Show the tip's path of a planned move, coloured by the share of a drive's limit."""
         self._remove(f"{_MOUNT}/path")
         if planned is None or len(planned.move.trajectory.t) < 2:
             return

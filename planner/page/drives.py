@@ -12,7 +12,7 @@ _BETWEEN = " + "
 
 
 def offered(catalogue: Catalogue, joint: str) -> tuple[str, ...]:
-    """Return the names of the drives that a joint may have: none, a motor with a gearbox, or an actuator."""
+    """Return the drives that a joint may have: none, a motor with a gearbox, or an actuator."""
     if IS_LENGTH[JOINTS.index(joint)]:
         return NONE, *catalogue.actuators
     return NONE, *(f"{motor}{_BETWEEN}{gearbox}" for motor in catalogue.motors for gearbox in catalogue.gearboxes)

@@ -30,7 +30,7 @@ class Worker:
     async def run(
         self, title: str, work: Callable[[Track], T], done: Callable[[T], None], refused: Callable[[str], None]
     ) -> None:
-        """Run a job; on the event loop, tell its result or why it was refused, unless it was stopped.
+        """Run a job, and tell its result or its refusal on the event loop, unless it was stopped.
 
         Args:
             title: of the job.

@@ -1,4 +1,4 @@
-"""What the page shows of a planned motion: verdict, table of joints, plots, and the values at one time."""
+"""What the page shows of a planned motion: verdict, joints, plots, values at one time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class Chart:
 
 
 def verdict_view(planned: Planned) -> str:
-    """Return what was asked, the verdict, the table of joints and the findings, as `boom plan` prints them."""
+    """Return the answer to a plan, as `boom plan` prints it."""
     move, words = planned.move, planned.words
     first = answer(move.report)
     asked = (

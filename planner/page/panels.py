@@ -1,4 +1,4 @@
-"""Panels of the page: its fields by name, the place of each complaint, and the places of the views."""
+"""Panels of the page: fields by name, places of complaints, places of views."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -122,7 +122,7 @@ class Panels:
 
 
 def build(gui: viser.GuiApi, state: State, edit: Edit, width: int) -> Panels:
-    """Build the panels of a tab: what is set on the left, what follows from it on the right, or below on a narrow screen.
+    """Build the panels: what is set on the left, what follows on the right, or below it.
 
     Args:
         gui: of the tab.

@@ -1,4 +1,4 @@
-"""What the page shows of one joint position: figures, torque bars and arrows, all from the public API."""
+"""What the page shows of one joint position: figures, torque bars and arrows."""
 
 from dataclasses import dataclass
 

@@ -72,7 +72,7 @@ class Session:
             self.plan()
 
     def apply(self, change: Callable[[State], State], but: str = "") -> None:
-        """Change the state, and show what differs; an error of the program is said in the page and on standard error."""
+        """Change the state, and show what differs, or a program error in the page and on stderr."""
         if self._closed:
             return
         before = self.state

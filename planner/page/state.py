@@ -57,7 +57,7 @@ _ANGLE_DIGITS, _LENGTH_DIGITS = 9, 12  # rounding of a branch's joints, in degre
 
 @dataclass(frozen=True)
 class TargetWords:
-    """Tip target in words, with the pitch and the constraint that all tip targets of the page share."""
+    """Tip target in words, with the pitch and constraint that all tip targets share."""
 
     x: float
     y: float
@@ -72,7 +72,7 @@ class TargetWords:
 
     @property
     def is_quick(self) -> bool:
-        """Whether a solution takes about a millisecond: one joint is fixed, and the pitch is given."""
+        """Whether a solution takes a millisecond: one joint is fixed, and the pitch given."""
         return isinstance(parse_constraint(self.constraint), FixingConstraint) and self.pitch != "free"
 
 
@@ -150,7 +150,7 @@ class State:
 def first_state(
     boom: Boom, boom_file: str | None = None, catalogue_file: str | None = None, payload: float | None = None
 ) -> State:
-    """Return the state that a new tab begins with: at the last named pose, with a move from the first to it.
+    """Return a new tab's state: at the last named pose, with a move from the first to it.
 
     Args:
         boom: the boom of the file.
@@ -186,7 +186,7 @@ def first_state(
 
 
 def edited(state: State, name: str, text: str) -> State:
-    """Return the state after a field was changed; a text that is refused leaves a complaint and nothing else."""
+    """Return the state after a field was changed; a refused text leaves a complaint alone."""
     asked = replace(state, asked={**state.asked, name: text})
     try:
         return _SETTERS[name](asked, text)
@@ -195,12 +195,13 @@ def edited(state: State, name: str, text: str) -> State:
 
 
 def solve(boom: Boom, target: TargetWords, near: Array) -> Branches:
-    """Return the branches for a tip target; slow under a constraint that chooses, or with a free pitch.
+    """Return the branches for a tip target; slow unless it `is_quick`.
 
     Args:
         boom: the boom.
         target: the target.
-        near: joint position (5,); of several branches within the limits the nearest to it is chosen.
+        near: joint position (5,); of several branches within the limits the nearest to it is
+            chosen.
     """
     pitch, constraint = parse_pitch(target.pitch), parse_constraint(target.constraint)
     found = inverse_kinematics(boom, target.position, pitch, constraint, near)
@@ -208,7 +209,7 @@ def solve(boom: Boom, target: TargetWords, near: Array) -> Branches:
 
 
 def with_branches(state: State, branches: Branches) -> State:
-    """Return the state with solutions of its target; those of another target are too late, and dropped."""
+    """Return the state with solutions of its target; those of another target are dropped."""
     if branches.target != state.target:
         return state
     state = replace(_clear(state, *TARGET), branches=branches)
@@ -230,7 +231,7 @@ def with_branch(state: State, index: int) -> State:
 
 
 def next_branch(state: State, step: int) -> State:
-    """Return the state with the next branch within the limits, or the one before with a step of -1."""
+    """Return the state with the next branch within the limits, or for -1 the one before."""
     if state.branches is None:
         return state
     within = [i for i, solution in enumerate(state.branches.found.solutions) if solution.within_limits]
@@ -242,7 +243,7 @@ def next_branch(state: State, step: int) -> State:
 
 
 def pose_word(state: State) -> str:
-    """Return the joint position of the sliders as a target of `boom plan`: a pose's name, or q=..."""
+    """Return the sliders' joint position as `boom plan` takes it: a pose's name, or q=..."""
     for name, q in state.boom.poses.items():
         if np.array_equal(q, state.q):
             return name
@@ -279,7 +280,7 @@ def _reason(boom: Boom, target: TargetWords, found: Solutions, constraint: Const
 
 
 def _at(state: State, joints: tuple[float, ...], *, follow: bool = True) -> State:
-    """Return the state at a joint position within the limits; its target follows the tip if `follow`."""
+    """Return the state at a joint position within the limits; its target may follow the tip."""
     q = joint_position("pose", words_of(joints))
     reasons = state.boom.limits.reasons(q)
     if reasons:
@@ -407,7 +408,7 @@ def _words(state: State) -> MoveWords:
 
 
 def changed_boom(state: State, boom: Boom) -> State:
-    """Return the state with another boom; its plan and workspace are those of the old one, and go."""
+    """Return the state with another boom, without the old one's plan and workspace."""
     return replace(_without_plan(state), boom=boom, workspace=None)
 
 
@@ -453,7 +454,7 @@ def written_limits(boom: Boom, name: str) -> tuple[float, ...]:
 
 
 def _with_written_limits(boom: Boom) -> Boom:
-    """Return the boom with the limits that its file will have, so that both plan the same to the last digit."""
+    """Return the boom with the limits that its file will have, to the last digit."""
 
     def read(name: str) -> Array:
         texts = np.array(written_limits(boom, name))

@@ -1,4 +1,4 @@
-"""Workspace of the tip as a layer: bands of a reach map, so that a long one shows its progress and can be stopped."""
+"""Workspace of the tip as a layer, mapped in bands that show progress and can be stopped."""
 
 from dataclasses import dataclass
 

@@ -271,7 +271,7 @@ class Side:
 
 
 def _rows(boom: Boom, T: float) -> list[tuple[Array, Array]]:
-    """Return the difference stencils of three derivatives, each with its limits (5,) at duration T."""
+    """Return the stencils of three derivatives, each with its limits (5,) at duration T."""
     limits = boom.limits
     stencils = [np.diff(np.eye(order + 1), order, axis=0)[0] * (NODES - 1.0) ** order for order in (1, 2, 3)]
     return list(zip(stencils, (limits.velocity * T, limits.acceleration * T**2, limits.jerk * T**3), strict=True))

@@ -159,7 +159,7 @@ def _html(title: str, markdown: str, drawn: Mapping[str, bytes], made: str, lead
 
 
 def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str, lead: _Lead = None) -> bytes:
-    """Return a PDF: a first page, headings, paragraphs, lists and tables, then a page for each picture."""
+    """Return a PDF: a first page, the text with its tables, then a page for each picture."""
     from fpdf import FPDF
 
     pdf = FPDF(orientation="landscape", format="A4")
@@ -181,7 +181,7 @@ def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str, lead: _Lead = Non
 
 
 def _set_markdown(pdf: "FPDF", markdown: str) -> None:
-    """Set headings, paragraphs, lists and tables; a paragraph that begins with a verdict has its colour."""
+    """Set text and tables; a paragraph that begins with a verdict has its colour."""
     from markdown_it import MarkdownIt
     from markdown_it.tree import SyntaxTreeNode
 

@@ -1,4 +1,4 @@
-"""First page of a move's report: what was asked, the verdict, the table of joints, the boom and its torques."""
+"""First page of a move's report: what was asked, verdict, joints, the boom, torques."""
 
 from typing import TYPE_CHECKING
 
@@ -38,7 +38,7 @@ def first_page(title: str, asked: str, report: Report) -> str:
 
 
 def first_picture(boom: Boom, motion: Trajectory, tau: Array) -> "Figure":
-    """Draw the boom at start, middle and end in the arm's plane and from above, and torque over time.
+    """Draw the boom at start, middle and end, from the side and above, and torque over time.
 
     Args:
         boom: the boom.

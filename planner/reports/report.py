@@ -151,7 +151,7 @@ class Report:
         return f"# {self.summary}\n\n{self.profile}, {self.duration:.3f} s\n{self.details()}"
 
     def details(self) -> str:
-        """Return all but the title: peaks, certificate and notes, then every check and assumption."""
+        """Return all but the title: peaks, certificate, notes, every check and assumption."""
         header = ("joint", "check", "demand", "limit", "margin", "required", "at", "verdict", "basis", "source")
         lines = []
         if self.peaks:

@@ -71,7 +71,7 @@ def _pair(row: Row | None) -> tuple[str, str]:
 
 
 def loads_side_by_side(reports: Mapping[str, Report]) -> list[tuple[str, ...]]:
-    """Return a row per joint: largest load, used share of the tightest limit, verdict per report."""
+    """Return a row per joint: largest load, share of the tightest limit, verdict by report."""
     tables = [{row[0]: row for row in joint_table(report)} for report in reports.values()]
     rows = []
     for joint in dict.fromkeys(name for each in tables for name in each):

@@ -36,7 +36,7 @@ class Point:
 
 @dataclass(frozen=True)
 class SpeedStep:
-    """Row of the torque-speed table: the largest torque between the speed of the row before and this one.
+    """Row of the torque-speed table: largest torque between the last row's speed and this.
 
     A drive with its own inertia J at the joint must give `torque` + J `acceleration` at `speed`.
     """
@@ -51,7 +51,7 @@ class SpeedStep:
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Samples of a joint's motion, and of the reversed motion, in which friction alone changes its sign."""
+    """Samples of a joint's motion, and of the reversed motion."""
 
     speed: Array
     """(n,) size of the joint speed [rad/s]."""
@@ -304,7 +304,7 @@ def _steps(cloud: Cloud, creep: float) -> tuple[SpeedStep, ...]:
 
 
 def _stiffness_together(M: Array, frequency: float) -> Array:
-    """Return the stiffness (5,) of all joints for a first frequency; M (m, 5, 5) are the mass matrices."""
+    """Return the stiffness (5,) of joints for a first frequency, at mass matrices M (m, 5, 5)."""
     largest = np.diagonal(M, axis1=-2, axis2=-1).max(axis=0)
     root = 1.0 / np.sqrt(np.where(largest > 0.0, largest, 1.0))
     factor = float(np.linalg.eigvalsh(root[:, None] * M * root)[..., -1].max())

@@ -16,7 +16,7 @@ _DRIVES, _BRAKES, _HULL, _TABLE = "#0072b2", "#e69f00", "#000000", "#d55e00"
 
 
 def requirement_pictures(needs: Sequence[Requirement]) -> dict[str, "Figure"]:
-    """Return the figure by title: a panel per joint; positive torque drives, negative torque brakes."""
+    """Return the figure by title: a panel per joint; torque above 0 drives, below 0 brakes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

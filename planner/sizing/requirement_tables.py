@@ -93,7 +93,7 @@ def step_rows(need: Requirement) -> list[tuple[str, ...]]:
 def requirement_markdown(
     title: str, needs: Sequence[Requirement], day: Day, notes: Sequence[str], assumed: Sequence[str]
 ) -> str:
-    """Return the sheets as Markdown: what one sends to a supplier; power and energy of the fitted drives first."""
+    """Return the sheets for a supplier as Markdown; power and energy of fitted drives first."""
     lines = [f"# {title}", "", *table(SHEET, sheet_rows(needs))]
     lines += ["", "## Power and energy", "", *table(ENERGY_HEADER, map(energy_cells, day.energy.joints))]
     lines += [f"\n{sentence}" for sentence in (*day.energy.sentences, *day.sentences)]

@@ -110,7 +110,7 @@ ANSWER = ("boom", "joint", "fitted", "lightest that does not fail", "mass", "sav
 
 
 def answer_rows(choices: Sequence[Choice]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return header and rows of what to fit: one row per joint, with the boom's name if there are several."""
+    """Return header and rows of what to fit: a row per joint, and boom if there are several."""
     rows = []
     for choice in choices:
         best, fitted = choice.lightest, choice.fitted

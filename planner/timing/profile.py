@@ -197,7 +197,7 @@ class TimeOptimal(TimingProfile):
 
 @dataclass(frozen=True)
 class LeastEnergy(TimingProfile):
-    """Motion of least loss in the motors' windings within a duration, and within the limits of joints and drives."""
+    """Motion of least loss in the windings within a duration and all limits."""
 
     name = Profile.LEAST_ENERGY
     needs_duration = True

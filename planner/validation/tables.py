@@ -72,7 +72,7 @@ def row_cells(row: ValidationRow) -> tuple[str, ...]:
 
 
 def by_table(rows: Sequence[ValidationRow]) -> list[tuple[str, str, str, str]]:
-    """Return for each table: name, number of values, how many hold, and the largest difference / tolerance."""
+    """Return per table: name, number of values, how many hold, largest difference / tolerance."""
     found = []
     for table in dict.fromkeys(row.table for row in rows):
         own = [row for row in rows if row.table == table]

@@ -21,8 +21,8 @@ def cpu_seconds(*arguments: str, where: Path) -> float:
 
 
 def test_a_plan_takes_under_five_imports_of_rerun(tmp_path: Path):
-    """2.9, or 3.0 to 3.9 where pandas is installed, which pyarrow then imports; the move itself is a
-    tenth of it."""
+    """2.9, or 3.0 to 3.9 where pandas is installed, which pyarrow then imports; the move itself is
+    a tenth of it."""
     processes = {"rerun": ("-c", "import rerun"), "plan": ("-m", "planner", "plan", "transport", "phenotyping")}
     spent = {name: [] for name in processes}
     for _ in range(ROUNDS):

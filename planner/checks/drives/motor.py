@@ -178,7 +178,7 @@ def _motor_speed_row(view: JointView, drive: Drive, torque: Array) -> Row:
 
 
 def _power_rows(view: JointView, drive: Drive) -> Iterator[Row]:
-    """Return the rows of the loss in the windings at rated current, and of the largest power at the shaft."""
+    """Return the rows of the winding loss at rated current and of the largest shaft power."""
     sheet, winding = _sheet(drive.motor), drive.winding
     loss = Origin(Basis.PRINTED, f"{sheet}; 2 I^2 R at rated current, cold winding")
     if drive.wiring is None or winding is None:

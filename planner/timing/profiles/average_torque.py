@@ -23,12 +23,14 @@ _EACH = 3
 def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
     """Find the fastest law within the average torque limits of the gearboxes.
 
-    Along a path the average, (int |tau|^3 |p'| ds / int |p'| ds)^(1/3), depends on the whole motion, which toppra cannot
-    take in. Two ways are searched, and the faster taken: a cap on the gearboxes' torque, between what holding the
-    load asks for and the unbounded law's peak, all joints' in proportion; and slowing that law evenly.
+    Along a path the average, (int |tau|^3 |p'| ds / int |p'| ds)^(1/3), depends on the whole
+    motion, which toppra cannot take in. Two ways are searched, and the faster taken: a cap on the
+    gearboxes' torque, between what holding the load asks for and the unbounded law's peak, all
+    joints' in proportion; and slowing that law evenly.
 
     Raises:
-        InfeasiblePathError: as `time_optimal`, or the average of the held load alone is beyond the limit.
+        InfeasiblePathError: as `time_optimal`, or the average of the held load alone is beyond the
+            limit.
     """
     sharp = time_optimal(boom, path, base)
     limits = np.array([(drive and drive.gearbox.max_average_torque) or np.inf for drive in boom.drives])
@@ -48,7 +50,7 @@ def within_average_torque(boom: Boom, path: Path, base: BaseMotion | None = None
 
     @cache
     def excess_of_share(share: float) -> float:
-        """Of the law capped at a share of the way from the held load to the peak; one that cannot move exceeds nothing."""
+        """Of the law capped at a share of the way from the held load to the peak; or 0."""
         try:
             capped = time_optimal(_capped(boom, floor + share * (peak - floor)), path, base)
         except InfeasiblePathError:

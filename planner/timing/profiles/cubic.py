@@ -7,7 +7,7 @@ from planner.timing.time_law import TimeLaw
 
 
 def cubic(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
-    """s(t) = 3 (t/T)^2 - 2 (t/T)^3 with the least T that keeps the limits of the joints and their drives.
+    """Time s(t) = 3 (t/T)^2 - 2 (t/T)^3 with the least T that keeps all limits.
 
     Its acceleration jumps to 6/T^2 at both ends, where the thesis's tables 2-4 and 3-1 print 0.
     """

@@ -72,14 +72,16 @@ def cubic_through(boom: Boom, waypoints: Array, base: BaseMotion | None = None) 
 def cubic_with_velocities(
     boom: Boom, waypoints: Array, velocities: Array, duration: float | None = None, base: BaseMotion | None = None
 ) -> Motion:
-    """One cubic a segment between waypoints (n, 5), passing those between the ends with `velocities` (n - 2, 5).
+    """Time a cubic per segment of waypoints (n, 5), with inner `velocities` (n - 2, 5).
 
-    Each segment takes the least duration that keeps the limits of joints and drives; the acceleration jumps at the waypoints.
-    A longer `duration` lengthens all segments alike and leaves the velocities.
+    Each segment takes the least duration that keeps the limits of joints and drives; the
+    acceleration jumps at the waypoints. A longer `duration` lengthens all segments alike and leaves
+    the velocities.
 
     Raises:
-        InfeasibleError: no duration of a segment keeps the limits (which segment, and the joint that comes nearest), the
-            duration is too short, or the motion leaves the position limits.
+        InfeasibleError: no duration of a segment keeps the limits (which segment, and the joint
+            that comes nearest), the duration is too short, or the motion leaves the position
+            limits.
     """
     from scipy.interpolate import CubicHermiteSpline
 

@@ -88,7 +88,7 @@ def copper_loss(demands: PathDynamics) -> Loss:
 
 
 def least_energy(boom: Boom, path: Path, duration: float, base: BaseMotion | None = None) -> TimeLaw:
-    """Return the law of least copper loss that takes at most `duration` [s], within the limits of `time_optimal`.
+    """Return the law of least copper loss in at most `duration` [s], within all limits.
 
     It takes less where going slower costs more, which is so where the motors hold a load. Limits
     that depend on the speed are taken at their tangent at the fastest law, which never allows more
@@ -195,7 +195,7 @@ def _at(place: int, part: Any, n: int) -> Any:
 
 
 def _add_cones(blocks: _Blocks, cones: list[Any], entries: list[tuple[Any, Any]]) -> None:
-    """Add a second-order cone for each row of the entries: the first is at least the norm of the others.
+    """Add a second-order cone per row: the first entry is at least the norm of the others.
 
     An entry is a matrix on the variables and a constant.
     """

@@ -7,7 +7,7 @@ from planner.timing.time_law import TimeLaw
 
 
 def quintic(boom: Boom, path: Path, base: BaseMotion | None = None) -> TimeLaw:
-    """s(t) = 10 (t/T)^3 - 15 (t/T)^4 + 6 (t/T)^5 with the least T that keeps the limits of the joints and their drives.
+    """Time s(t) = 10 (t/T)^3 - 15 (t/T)^4 + 6 (t/T)^5 with the least T that keeps all limits.
 
     Its jerk is finite, 60/T^3 at most, but held to no limit.
     """

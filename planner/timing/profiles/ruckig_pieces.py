@@ -11,9 +11,10 @@ Numbers = Sequence[float] | Array
 
 
 def pieces(profile: Any) -> tuple[Array, Array]:
-    """Durations (9,) and coefficients (4, 9), highest power first, of one degree of freedom of a ruckig trajectory.
+    """Durations (9,) and coefficients (4, 9), highest power first, of one joint in ruckig.
 
-    The first two pieces brake a state that is beyond its limits, the other seven are the profile itself.
+    The first two pieces brake a state that is beyond its limits, the other seven are the profile
+    itself.
     """
     brake = profile.brake
     t = np.array([*brake.t, *profile.t])
@@ -24,7 +25,7 @@ def pieces(profile: Any) -> tuple[Array, Array]:
 
 
 def brake_to_rest(state: Sequence[Numbers], acceleration: Numbers, jerk: Numbers | None) -> list[tuple[Array, Array]] | None:
-    """Return ruckig's polynomials to rest from (position, velocity, acceleration), one for each degree of freedom.
+    """Return ruckig's polynomials to rest from position, velocity and acceleration, per joint.
 
     None where it finds nothing. Without a limit on jerk an acceleration is given up at once.
     """

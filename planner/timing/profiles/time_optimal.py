@@ -50,28 +50,30 @@ def time_optimal(
 ) -> TimeLaw:
     """Find the least-time law from rest to rest within velocity, acceleration and drive limits.
 
-    The path acceleration is constant over each of the `GRID_INTERVALS` steps in s, and the conditions hold at both ends of each
-    (toppra's interpolation scheme). Between them the torques can exceed their limits by the square of the step. The steps are
-    equal, and shorter between knots of the path that are near to each other. On a curved path the speed is capped where a
+    The path acceleration is constant over each of the `GRID_INTERVALS` steps in s, and the
+    conditions hold at both ends of each (toppra's interpolation scheme). Between them the torques
+    can exceed their limits by the square of the step. The steps are equal, and shorter between
+    knots of the path that are near to each other. On a curved path the speed is capped where a
     limit is broken inside a step all the same, and the law solved for again.
 
-    A drive's limit falls with its speed and viscous friction grows with it; toppra holds only what is linear in u and x. Both
-    are therefore replaced by their tangents, which never allow more than the true ones: taken at low speed first, then at the
-    speeds of the solve before, until that adds nothing where a limit is met. Every solve keeps the true limits. The tangents
-    settle on a rough grid, from which the full one starts.
+    A drive's limit falls with its speed and viscous friction grows with it; toppra holds only what
+    is linear in u and x. Both are therefore replaced by their tangents, which never allow more than
+    the true ones: taken at low speed first, then at the speeds of the solve before, until that adds
+    nothing where a limit is met. Every solve keeps the true limits. The tangents settle on a rough
+    grid, from which the full one starts.
 
     Args:
         boom: the boom.
         path: the path.
         base: tilt of the base, which must not move; None is level.
-        even: whether all steps are equal, and none is looked into. Between near knots such a law is smoother, and must be
-            slowed for what it breaks.
-        jerk_share: the share of the joints' jerk limits that |p'''| s'^3 may take, the part that the path's shape asks for;
-            None holds it to no limit.
+        even: whether all steps are equal, and none is looked into. Between near knots such a law is
+            smoother, and must be slowed for what it breaks.
+        jerk_share: the share of the joints' jerk limits that |p'''| s'^3 may take, the part that
+            the path's shape asks for; None holds it to no limit.
 
     Raises:
-        InfeasiblePathError: no law keeps the limits, or a drive could not stop and hold its load somewhere;
-            names the joint, the place, the demand and the limit.
+        InfeasiblePathError: no law keeps the limits, or a drive could not stop and hold its load
+            somewhere; names the joint, the place, the demand and the limit.
     """
     s = np.linspace(0.0, 1.0, GRID_INTERVALS + 1) if even else spread(path, GRID_INTERVALS)
     demands = path_dynamics(boom, path, s, base)
@@ -93,7 +95,7 @@ def time_optimal(
 
 
 def _shape_cap(boom: Boom, path: Path, s: Array) -> Array:
-    """(n,) the largest x at which |p'''| x^(3/2) keeps the jerk limits in the steps on either side of s (n,)."""
+    """Return the largest x (n,) at which |p'''| x^(3/2) keeps the jerk limits around s (n,)."""
     bend = (np.abs(path((s[1:] + s[:-1]) / 2.0, 3)) / boom.limits.jerk).max(axis=1)
     beside = np.maximum(np.append(bend, 0.0), np.append(0.0, bend))
     with np.errstate(divide="ignore"):
@@ -127,7 +129,7 @@ def _repaired(demands: PathDynamics, found: "_Found", unit: float) -> TimeLaw:
 
 
 def _between(demands: PathDynamics, law: TimeLaw) -> tuple[Array, Array]:
-    """(n,) twice by grid point, the worst ratio to acceleration and drive limits inside the steps on either side of it."""
+    """Return twice (n,): the worst ratio to acceleration and drive limits around each point."""
     start, length = law.s.x[:-1, None], np.diff(law.s.x)[:, None]
     t = start + length * _INSIDE
     ratios = demand_ratios(demands.boom, demands.path, law, t.ravel(), demands.base)
@@ -158,7 +160,7 @@ def _durations(s: Array, speed: Array) -> Array:
 
 
 def _time_scale(demands: PathDynamics) -> float:
-    """[s] of the order of the least duration: the solver wants units in which s' and s'' are of order one."""
+    """Return a time [s] of the order of the duration, in whose unit s' and s'' are about one."""
     boom = demands.boom
     pushed = np.abs(demands.p1) / boom.limits.acceleration, np.abs(demands.a) / static_limits(boom)
     fastest = float((np.abs(demands.p1) / boom.limits.velocity).max())
@@ -181,7 +183,7 @@ def _iterate(demands: PathDynamics, path: Path, x: Array, unit: float) -> _Found
 
 
 def _gain(s: Array, speed: Array, old: _Rows, new: _Rows) -> float:
-    """How much more of a limit the new rows allow at a law's x, at most, where the law meets the old ones."""
+    """Return how much more the new rows allow at a law's x, where it meets the old ones."""
     a, b, c = old
     x = speed[:, None] ** 2
     u = np.diff(x, axis=0) / (2.0 * np.diff(s)[:, None])
@@ -202,7 +204,7 @@ def breakable_rows(rows: _Rows, demands: PathDynamics) -> _Rows:
 
 
 def limit_rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
-    """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,)."""
+    """Return a u + b x + c <= 1 as arrays (n, m), the drives' curves by tangents at x (n,)."""
     boom, zero = demands.boom, np.zeros_like(demands.s)
     at_rest, gears, inertias = motor_limits(boom, np.zeros(5)), gear_limits(boom), rotors(boom)
     intercepts, slopes = demands.friction_tangent(x)
