@@ -96,7 +96,7 @@ def _answer(case: Case, values: Sequence[Value]) -> dict[str, Any]:
         cycle = plan_cycle(boom, mission, step=case.step)
     bears = boom.mount.force is not None or boom.mount.moment is not None
     evaluation = at_samples(boom, cycle.trajectory, reactions=bears)
-    found = responses(boom, cycle, check_rows(evaluation, cycle.duty), case.joints)
+    found = responses(evaluation, cycle, check_rows(evaluation, cycle.duty), case.joints)
     return found if link_mass is None else {**found, "link_kg": link_mass}
 
 

@@ -8,6 +8,7 @@ from boom_model import InputError
 from planner.studies.analysis import FAILS
 from planner.studies.designs import DesignKind
 from planner.studies.factors import Factor
+from planner.studies.report import front_rows, response_rows, to_json
 from tests.studies.helpers import normal, results_of, uniform
 
 G = np.array([0.0, 1.0, 4.5, 9.0])
@@ -158,3 +159,15 @@ def test_an_unknown_response_is_named_with_the_nearest(tmp_path):
     made = results_of(tmp_path, lambda x: x[:, 0], [uniform("a", 0.0, 1.0)], DesignKind.SOBOL, 8)
     with pytest.raises(InputError, match="unknown response 'statu'; did you mean status"):
         made.summary("statu")
+
+
+def test_people_read_units_and_files_hold_si(tmp_path):
+    factors = [Factor("a", (), False, levels=(0.0, 1.0, 2.0)), Factor("word", (), False, levels=("only",))]
+    energy = {"energy_J": np.array([7200.0, 3600.0, 10_800.0])}
+    pareto = ("y", "energy_J")
+    made = results_of(tmp_path, lambda x: x[:, 0], factors, DesignKind.GRID, 1, pareto=pareto, more=energy)
+    assert front_rows(made) == (("y", "energy [Wh]", "a"), [("0", "2", "0"), ("1", "1", "1")])
+    assert to_json(made, {})["pareto"] == [{"y": 0.0, "energy_J": 7200.0, "a": 0.0}, {"y": 1.0, "energy_J": 3600.0, "a": 1.0}]
+    found = made.summary("energy_J")
+    assert (found.name, found.quantiles[1]) == ("energy_J", 7200.0)
+    assert response_rows([found])[0][:4] == ("energy [Wh]", "-", "1.1", "2")
