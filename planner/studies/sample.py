@@ -53,7 +53,7 @@ def compute_chunk(case: Case, points: Points, seed: int) -> "pa.Table":
 
     rows = []
     for index, point, values in points:
-        factors = {factor.name: value for factor, value in zip(case.factors, values, strict=True)}
+        factors = {f.name: value if f.numeric else str(value) for f, value in zip(case.factors, values, strict=True)}
         fixed = {"sample": index, "point": point, "seed": seed, **factors}
         rows.append({**fixed, "tightest": None, "failing": None, **compute(case, values)})
     names = list(dict.fromkeys(name for row in rows for name in row))
@@ -119,16 +119,12 @@ def _with_profile(steps: Any, profile: Value) -> list[Any]:
 
 
 def _column(values: list[Any]) -> "pa.Array":
-    """Return a column of numbers, texts, truth values or nothing at all, of a type that does not depend on the chunk."""
+    """Return a column of numbers, texts or nothing at all, of a type that does not depend on the chunk."""
     import pyarrow as pa
 
     known = [value for value in values if value is not None]
     if not known:
         return pa.nulls(len(values))
-    if all(isinstance(value, bool) for value in known):
-        return pa.array(values, pa.bool_())
     if all(type(value) is int for value in known):
         return pa.array(values, pa.int64())
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in known):
-        return pa.array(values, pa.float64())
-    return pa.array([None if value is None else str(value) for value in values], pa.string())
+    return pa.array(values, pa.string() if isinstance(known[0], str) else pa.float64())
