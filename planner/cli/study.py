@@ -103,10 +103,10 @@ def _print(results: "Results", written: dict[str, str], whole: bool, as_json: bo
     print_lines(None, report.sentences(results))
     found = report.summaries(results)
     if found:
-        print_rows(report.RESPONSE_HEADER, report.response_rows(found), drop=("first order", "sd", "nominal"))
+        print_rows(*report.told(report.RESPONSE_HEADER, report.response_rows(found)), drop=("first order", "sd", "nominal"))
     for header, rows, few in _details(results):
         if rows:
-            print_rows(header, rows if whole else rows[:few])
+            print_rows(*report.told(header, rows if whole else rows[:few]))
     said = report.notes(results)
     if whole:
         print_lines("note", said)

@@ -115,12 +115,14 @@ def _scatter(results: Results, response: str, factor: str) -> "Figure":
 
 
 def _grid_map(results: Results) -> "Figure | None":
-    """Return a map over the two factors of most levels: the share of the other combinations that FAIL."""
+    """Return a map over the two factors that decide most: the share of the other combinations that FAIL."""
     design = results.study.design
     counts = [len(factor.levels) for factor in design.factors]
     if sum(count > 1 for count in counts) < 2:
         return None
-    i, j = sorted(np.argsort(counts, kind="stable")[-2:])
+    ranks = {index.factor: index.rank for index in results.indices(FAILS)}
+    order = sorted(range(len(counts)), key=lambda k: (round(ranks.get(design.factors[k].name, 0.0), 3), counts[k]))
+    i, j = sorted(order[-2:])
     fails, known = results.numbers(FAILS), ~results.refused
     shape = (counts[j], counts[i])
     total, failing = np.zeros(shape), np.zeros(shape)

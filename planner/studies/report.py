@@ -60,6 +60,12 @@ def summaries(results: Results) -> tuple[ResponseSummary, ...]:
     )
 
 
+def told(header: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of a table without the columns that hold "-" in every row."""
+    kept = [i for i in range(len(header)) if not rows or any(row[i] != "-" for row in rows)]
+    return tuple(header[i] for i in kept), [tuple(row[i] for i in kept) for row in rows]
+
+
 def response_rows(found: Sequence[ResponseSummary]) -> list[tuple[str, ...]]:
     """Return the rows of RESPONSE_HEADER."""
     rows = []
@@ -86,9 +92,9 @@ def index_rows(results: Results, indices: Sequence[Index]) -> list[tuple[str, ..
         (
             index.factor,
             f"{index.first:.3f}",
-            f"{index.first_error:.3f}",
+            f"{index.first_error:.3f}" if index.first_error else "-",
             "-" if index.total is None else f"{index.total:.3f}",
-            "-" if index.total_error is None else f"{index.total_error:.3f}",
+            f"{index.total_error:.3f}" if index.total_error else "-",
             laws[index.factor],
         )
         for index in indices
@@ -96,10 +102,17 @@ def index_rows(results: Results, indices: Sequence[Index]) -> list[tuple[str, ..
 
 
 def level_rows(results: Results) -> list[tuple[str, ...]]:
-    """Return the rows of LEVEL_HEADER, for factors of few levels."""
-    few = {factor.name for factor in results.study.design.factors if len(factor.levels) <= _FEW}
+    """Return the rows of LEVEL_HEADER, for factors of several levels but few."""
+    few = {factor.name for factor in results.study.design.factors if 1 < len(factor.levels) <= _FEW}
+    grid = results.study.design.kind is DesignKind.GRID
     return [
-        (name, level, percent(found.estimate), f"{percent(found.low)} to {percent(found.high)}", f"{found.samples:,}")
+        (
+            name,
+            level,
+            percent(found.estimate),
+            "-" if grid else f"{percent(found.low)} to {percent(found.high)}",
+            f"{found.samples:,}",
+        )
         for name, level, found in results.by_level()
         if name in few and found is not None
     ]
@@ -167,13 +180,15 @@ def to_markdown(results: Results) -> str:
     """Return the report of a study."""
     asked, how, answer = sentences(results)
     found = summaries(results)
-    lines = [f"# {asked}", "", how, "", answer, "", "## Responses", "", *table(RESPONSE_HEADER, response_rows(found))]
-    lines += ["", "*First order* is the standard deviation by first-order propagation of the factors' deviations."]
+    lines = [f"# {asked}", "", how, "", answer, "", "## Responses", ""]
+    lines += table(*told(RESPONSE_HEADER, response_rows(found)))
+    if any(each.first_order is not None for each in found):
+        lines += ["", "*First order* is the standard deviation by first-order propagation of the factors' deviations."]
     for name, indices in _indexed(results, found):
-        lines += ["", f"## What decides {label(name)[0]}", "", *table(INDEX_HEADER, index_rows(results, indices))]
+        lines += ["", f"## What decides {label(name)[0]}", "", *table(*told(INDEX_HEADER, index_rows(results, indices)))]
     levels = level_rows(results)
     if levels:
-        lines += ["", "## By level", "", *table(LEVEL_HEADER, levels)]
+        lines += ["", "## By level", "", *table(*told(LEVEL_HEADER, levels))]
     if results.study.design.kind is not DesignKind.GRID:
         header, rows = combination_rows(results)
         if rows:

@@ -8,7 +8,7 @@ from boom_model import InputError
 from planner.studies.analysis import FAILS
 from planner.studies.designs import DesignKind
 from planner.studies.factors import Factor
-from planner.studies.report import front_rows, response_rows, to_json
+from planner.studies.report import front_rows, response_rows, to_json, told
 from tests.studies.helpers import normal, results_of, uniform
 
 G = np.array([0.0, 1.0, 4.5, 9.0])
@@ -55,6 +55,25 @@ def test_sobol_indices_are_the_closed_form_ones_within_their_errors(tmp_path, na
         assert abs(index.total - total[i]) <= index.total_error + 1e-9, index
         assert index.total_error < 0.1
         assert index.first_error < 0.12
+
+
+def test_a_grid_gives_exact_shares_of_the_variance(tmp_path):
+    """Of y = a + 2 b + a b on levels a = -1, 1 and b = -1, 0, 1: variances 1, 8/3 and 2/3."""
+    factors = [
+        Factor("a", (), False, levels=(-1.0, 1.0)),
+        Factor("b", (), False, levels=(-1.0, 0.0, 1.0)),
+        Factor("c", (), False, levels=("only",)),
+    ]
+    parts = np.array([1.0, 8.0 / 3.0, 2.0 / 3.0])
+    made = results_of(
+        tmp_path, lambda x: (2 * x[:, 0] - 1) + (x[:, 1] - 1) * (2 + (2 * x[:, 0] - 1)), factors, DesignKind.GRID, 1
+    )
+    b, a = made.indices("y")
+    assert (a.factor, b.factor) == ("a", "b")
+    whole = parts.sum()
+    np.testing.assert_allclose([a.first, b.first], parts[:2] / whole, rtol=1e-12)
+    np.testing.assert_allclose([a.total, b.total], (parts[:2] + parts[2]) / whole, rtol=1e-12)
+    assert told(("a", "b"), [("-", "1"), ("-", "-")]) == (("b",), [("1",), ("-",)])
 
 
 def test_given_data_gives_first_order_indices_of_any_random_design(tmp_path):
