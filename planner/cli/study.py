@@ -54,6 +54,7 @@ def study(
     """
     from planner.studies.analysis import Results
     from planner.studies.engine import run
+    from planner.studies.sample import check_responses
     from planner.studies.store import Store
     from planner.studies.study import load_study
 
@@ -61,6 +62,7 @@ def study(
         raise InputError("--workers is for local processes; a scheduler has workers of its own")
     catalogue = given_catalogue()
     asked = load_study(study, samples=samples, seed=seed, boom=boom_file, catalogue=catalogue, links=links)
+    check_responses(asked)
     dataset = out or f"{asked.name}.parquet"
     files = outputs(dataset, picture, document=document, inputs=(study, boom_file, links))
     store = Store(dataset, asked)

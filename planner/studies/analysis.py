@@ -10,11 +10,11 @@ import numpy as np
 
 from boom_model.arrays import Array, Mask
 from boom_model.errors import InputError
-from boom_model.words import unknown
 from planner.checks.rows import Verdict
 from planner.studies.designs import DESIGN, DesignKind, problem
 from planner.studies.extra import required
-from planner.studies.sample import INFEASIBLE, REFUSED
+from planner.studies.responses import LABELS, unknown_response
+from planner.studies.sample import DONE, INFEASIBLE, REFUSED
 from planner.studies.study import Study
 
 CONFIDENCE = 0.95
@@ -139,7 +139,7 @@ class Results:
         import pyarrow as pa
 
         if name not in self.names:
-            raise unknown("response", name, self.names)
+            raise unknown_response(name, self.names)
         if name not in self._columns:
             column = self._file.read([name])[name]
             numeric = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
@@ -149,13 +149,17 @@ class Results:
         return self._columns[name]
 
     def numbers(self, name: str) -> Array:
-        """Return a response over all points; FAILS is 1 where a sample FAILs, NaN where it was refused.
+        """Return a response over all points; NaN where a sample has none.
+
+        FAILS is 1 where a sample FAILs, NaN where it was refused.
 
         Raises:
             InputError: there is no such column, or it holds no numbers.
         """
         if name == FAILS:
             return np.where(self.refused, np.nan, (self.column("verdict") == str(Verdict.FAIL)).astype(float))
+        if name not in self.names and (name in LABELS or not (self.column("status") == DONE).any()):
+            return np.full(len(self.refused), np.nan)
         values = self.column(name)
         if values.dtype == object:
             raise InputError(f"response {name}: it is not a number")

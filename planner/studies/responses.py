@@ -1,10 +1,11 @@
 """Responses of a sample: the columns of the dataset that the mission's checks give."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from boom_model import Boom
+from boom_model import Boom, InputError
 from boom_model.drives.linear_actuator import LinearDrive
+from boom_model.words import nearest_name
 from planner.checks.energy import Energy
 from planner.checks.evaluation import Evaluation
 from planner.checks.kinds import CheckKind, Part
@@ -32,6 +33,13 @@ LABELS = {
 def label(name: str) -> tuple[str, float]:
     """Return what people read in place of a column's name, and the size of its unit in SI."""
     return LABELS.get(name, (name, 1.0))
+
+
+def unknown_response(name: str, known: Iterable[str]) -> InputError:
+    """Return the error of a response that no sample has; the nearest of the known ones is suggested."""
+    meant = nearest_name(name, known)
+    hint = "every column of the dataset that holds numbers is one" if meant is None else f"did you mean {meant}?"
+    return InputError(f"unknown response {name!r}; {hint}")
 
 
 def responses(evaluation: Evaluation, cycle: Cycle, rows: Sequence[Row], joints: Sequence[str]) -> dict[str, Any]:

@@ -12,8 +12,8 @@ from planner.checks.motion_checks import check_rows
 from planner.checks.rows import Verdict
 from planner.missions.mission import Mission, mission_of, plan_cycle
 from planner.studies.designed_link import link_task, with_designed_link
-from planner.studies.responses import responses
-from planner.studies.study import Case, Inputs
+from planner.studies.responses import LABELS, responses, unknown_response
+from planner.studies.study import Case, Inputs, Study
 from planner.studies.tables import Tree, Value, filled, get, put, scaled
 
 if TYPE_CHECKING:
@@ -45,6 +45,24 @@ def compute(case: Case, values: Sequence[Value]) -> dict[str, Any]:
         return {"status": REFUSED, "reason": str(error), "verdict": None}
     except (ArithmeticError, RecursionError) as error:
         return {"status": REFUSED, "reason": f"the numbers are beyond what can be computed: {error}", "verdict": None}
+
+
+def check_responses(study: Study) -> None:
+    """Check by the first point of a study that its responses are numbers that samples have.
+
+    A first point without an answer tells nothing.
+
+    Raises:
+        InputError: a response or a name of the Pareto front is unknown, or no number.
+    """
+    found = compute(study.case, study.design.values(0))
+    if found["status"] != DONE:
+        return
+    for name in (*study.responses, *study.pareto):
+        if name not in found and name not in LABELS:
+            raise unknown_response(name, found)
+        if isinstance(found.get(name), str):
+            raise InputError(f"response {name}: it is not a number")
 
 
 def compute_chunk(case: Case, points: Points, seed: int) -> "pa.Table":
