@@ -54,6 +54,7 @@ def study(
     """
     from planner.studies.analysis import Results
     from planner.studies.engine import run
+    from planner.studies.sample import check_responses
     from planner.studies.store import Store
     from planner.studies.study import load_study
 
@@ -61,6 +62,7 @@ def study(
         raise InputError("--workers is for local processes; a scheduler has workers of its own")
     catalogue = given_catalogue()
     asked = load_study(study, samples=samples, seed=seed, boom=boom_file, catalogue=catalogue, links=links)
+    check_responses(asked)
     dataset = out or f"{asked.name}.parquet"
     files = outputs(dataset, picture, document=document, inputs=(study, boom_file, links))
     store = Store(dataset, asked)
@@ -103,10 +105,10 @@ def _print(results: "Results", written: dict[str, str], whole: bool, as_json: bo
     print_lines(None, report.sentences(results))
     found = report.summaries(results)
     if found:
-        print_rows(report.RESPONSE_HEADER, report.response_rows(found), drop=("first order", "sd", "nominal"))
+        print_rows(*report.told(report.RESPONSE_HEADER, report.response_rows(found)), drop=("first order", "sd", "nominal"))
     for header, rows, few in _details(results):
         if rows:
-            print_rows(header, rows if whole else rows[:few])
+            print_rows(*report.told(header, rows if whole else rows[:few]))
     said = report.notes(results)
     if whole:
         print_lines("note", said)

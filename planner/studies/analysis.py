@@ -10,11 +10,11 @@ import numpy as np
 
 from boom_model.arrays import Array, Mask
 from boom_model.errors import InputError
-from boom_model.words import unknown
 from planner.checks.rows import Verdict
 from planner.studies.designs import DESIGN, DesignKind, problem
 from planner.studies.extra import required
-from planner.studies.sample import INFEASIBLE, REFUSED
+from planner.studies.responses import LABELS, unknown_response
+from planner.studies.sample import DONE, INFEASIBLE, REFUSED
 from planner.studies.study import Study
 
 CONFIDENCE = 0.95
@@ -139,7 +139,7 @@ class Results:
         import pyarrow as pa
 
         if name not in self.names:
-            raise unknown("response", name, self.names)
+            raise unknown_response(name, self.names)
         if name not in self._columns:
             column = self._file.read([name])[name]
             numeric = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
@@ -149,13 +149,17 @@ class Results:
         return self._columns[name]
 
     def numbers(self, name: str) -> Array:
-        """Return a response over all points; FAILS is 1 where a sample FAILs, NaN where it was refused.
+        """Return a response over all points; NaN where a sample has none.
+
+        FAILS is 1 where a sample FAILs, NaN where it was refused.
 
         Raises:
             InputError: there is no such column, or it holds no numbers.
         """
         if name == FAILS:
             return np.where(self.refused, np.nan, (self.column("verdict") == str(Verdict.FAIL)).astype(float))
+        if name not in self.names and (name in LABELS or not (self.column("status") == DONE).any()):
+            return np.full(len(self.refused), np.nan)
         values = self.column(name)
         if values.dtype == object:
             raise InputError(f"response {name}: it is not a number")
@@ -304,15 +308,16 @@ class Results:
 
         They are total and first-order ones by SALib's estimators from Saltelli's design, where
         blocks with a missing value are left out; first-order ones of the factors with a
-        distribution, by RBD-FAST, from any other random design. () where there are too few
-        samples, or where the response does not vary.
+        distribution, by RBD-FAST, from any other random design. A grid has every combination, so
+        its shares of the variance are exact. () where there are too few samples, or where the
+        response does not vary.
         """
         design = self.study.design
         values = self.numbers(name)[design.first :]
         if design.kind is DesignKind.SOBOL_INDICES:
             found = self._saltelli(values)
         elif design.kind is DesignKind.GRID:
-            found = []
+            found = self._factorial(values)
         else:
             found = self._given_data(values)
         return tuple(sorted(found, key=lambda index: -index.rank))
@@ -333,6 +338,29 @@ class Results:
         )
         columns = (found[key] for key in ("S1", "S1_conf", "ST", "ST_conf"))
         return [Index(name, *map(float, row)) for name, *row in zip(names, *columns, strict=True)]
+
+    def _factorial(self, values: Array) -> list[Index]:
+        """Return shares of the variance over a grid; combinations without a value are left out.
+
+        first = 1 - SS(y - mean of y at the factor's level) / SS(y - mean of y)
+        total = SS(y - mean of y at the other factors' levels) / SS(y - mean of y)
+        """
+        known = np.isfinite(values)
+        y, levels = values[known], self.study.design.coordinates[known]
+        if not len(y) or np.ptp(y) == 0.0:
+            return []
+        whole = _spread(y, np.zeros((len(y), 1)))
+        return [
+            Index(
+                factor.name,
+                max(1.0 - _spread(y, levels[:, [i]]) / whole, 0.0),
+                0.0,
+                _spread(y, np.delete(levels, i, axis=1)) / whole,
+                0.0,
+            )
+            for i, factor in enumerate(self.study.design.factors)
+            if len(factor.levels) > 1
+        ]
 
     def _given_data(self, values: Array) -> list[Index]:
         design = self.study.design
@@ -364,3 +392,10 @@ class Results:
             if not kept or not (table[kept] <= table[i]).all(axis=1).any():
                 kept.append(int(i))
         return np.array(kept, dtype=int)
+
+
+def _spread(y: Array, keys: Array) -> float:
+    """Return the sum of squares of y (n,) about the means of its groups of equal keys (n, k)."""
+    group = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+    means = np.bincount(group, weights=y) / np.bincount(group)
+    return float(((y - means[group]) ** 2).sum())

@@ -110,7 +110,14 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
         {
             "distributed.scheduler.allowed-failures": _DEATHS,
             "distributed.admin.log-format": "%(message)s",
-            "distributed.worker.profile.enabled": False,  # it interrupts the samples a hundred times a second
+            # What would interrupt the samples up to a hundred times a second, for a dashboard that
+            # nobody looks at.
+            "distributed.worker.profile.enabled": False,
+            "distributed.admin.tick.interval": "1s",
+            "distributed.admin.system-monitor.interval": "10s",
+            # Dask would have every array above 128 kB given back to the system at once; the next
+            # sample would fetch the same pages again, which takes a tenth of its time.
+            "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
         }
     )
     if scheduler is None:

@@ -7,6 +7,7 @@ import numpy as np
 from planner.studies.analysis import FAILS, Index, Results, Swing
 from planner.studies.designs import DesignKind
 from planner.studies.report import decided_by, summaries
+from planner.studies.responses import label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,9 +25,9 @@ def study_pictures(results: Results) -> dict[str, "Figure"]:
     for each in found:
         swings = [swing for swing in each.swings if swing.high > swing.low]
         if swings and each.nominal is not None:
-            pictures[f"Tornado: {each.name}"] = _tornado(each.name, swings, each.nominal)
+            pictures[f"Tornado: {label(each.name)[0]}"] = _tornado(each.name, swings, each.nominal)
         if each.indices:
-            pictures[f"What decides {each.name}"] = _indices(each.name, list(each.indices))
+            pictures[f"What decides {label(each.name)[0]}"] = _indices(each.name, list(each.indices))
     scatter = _grid_map(results) if results.study.design.kind is DesignKind.GRID else None
     if scatter is not None:
         pictures["FAIL over the grid"] = scatter
@@ -66,11 +67,14 @@ def _figure(height: float = 4.5) -> "tuple[Figure, Axes]":
 
 def _tornado(name: str, swings: list[Swing], nominal: float) -> "Figure":
     shown = swings[:_MOST_BARS][::-1]
+    text, size = label(name)
     figure, axes = _figure(1.5 + 0.3 * len(shown))
-    axes.barh([s.factor for s in shown], [s.high - s.low for s in shown], left=[s.low for s in shown], color=_PASS)
+    axes.barh(
+        [s.factor for s in shown], [(s.high - s.low) / size for s in shown], left=[s.low / size for s in shown], color=_PASS
+    )
     axes.use_sticky_edges = False  # else the first bar would start at the frame
-    axes.axvline(nominal, color="black", linewidth=0.8)
-    axes.set(xlabel=f"{name}; each factor a standard deviation, or a level, off nominal")
+    axes.axvline(nominal / size, color="black", linewidth=0.8)
+    axes.set(xlabel=f"{text}; each factor a standard deviation, or a level, off nominal")
     axes.grid(alpha=0.3, axis="x")
     return figure
 
@@ -85,7 +89,7 @@ def _indices(name: str, indices: list[Index]) -> "Figure":
         totals, errors = [index.total or 0.0 for index in shown], [index.total_error or 0.0 for index in shown]
         axes.barh(places - 0.2, totals, 0.38, xerr=errors, color=_FRONT, label="with interactions")
     axes.set_yticks(places, [index.factor for index in shown])
-    axes.set(xlabel=f"share of the variance of {name} (Sobol index, 95 % interval)")
+    axes.set(xlabel=f"share of the variance of {label(name)[0].partition(' [')[0]} (Sobol index, 95 % interval)")
     axes.grid(alpha=0.3, axis="x")
     axes.legend(frameon=False)
     return figure
@@ -96,26 +100,29 @@ def _scatter(results: Results, response: str, factor: str) -> "Figure":
     names = [each.name for each in results.study.design.factors]
     i = names.index(factor) if factor in names else 0
     chosen = np.flatnonzero(results.drawn)[:_MOST_DOTS]
-    x, y = results.study.design.coordinates[chosen, i], results.numbers(response)[chosen]
+    text, size = label(response)
+    x, y = results.study.design.coordinates[chosen, i], results.numbers(response)[chosen] / size
     fails = results.numbers(FAILS)[chosen] == 1.0
     axes.scatter(x[~fails], y[~fails], s=8, color=_PASS, label="does not FAIL")
     axes.scatter(x[fails], y[fails], s=14, color=_FAIL, marker="x", label="FAIL")
     levels = results.study.design.factors[i].levels
     if levels:
         axes.set_xticks(range(len(levels)), [str(level) for level in levels])
-    axes.set(xlabel=names[i], ylabel=response)
+    axes.set(xlabel=names[i], ylabel=text)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     return figure
 
 
 def _grid_map(results: Results) -> "Figure | None":
-    """Return a map over the two factors of most levels: the share of the other combinations that FAIL."""
+    """Return a map over the two factors that decide most: the share of the other combinations that FAIL."""
     design = results.study.design
     counts = [len(factor.levels) for factor in design.factors]
     if sum(count > 1 for count in counts) < 2:
         return None
-    i, j = sorted(np.argsort(counts, kind="stable")[-2:])
+    ranks = {index.factor: index.rank for index in results.indices(FAILS)}
+    order = sorted(range(len(counts)), key=lambda k: (round(ranks.get(design.factors[k].name, 0.0), 3), counts[k]))
+    i, j = sorted(order[-2:])
     fails, known = results.numbers(FAILS), ~results.refused
     shape = (counts[j], counts[i])
     total, failing = np.zeros(shape), np.zeros(shape)
@@ -141,19 +148,21 @@ def _label(level: object) -> str:
 def _pareto(results: Results) -> "Figure":
     figure, axes = _figure(5.0)
     x_name, y_name, *rest = results.study.pareto
-    x, y, fails = results.numbers(x_name), results.numbers(y_name), results.numbers(FAILS)
+    (x_text, x_size), (y_text, y_size) = label(x_name), label(y_name)
+    x, y, fails = results.numbers(x_name) / x_size, results.numbers(y_name) / y_size, results.numbers(FAILS)
     front = results.front(results.study.pareto)
-    for mask, color, mark, label in ((fails == 0.0, _PASS, "o", "does not FAIL"), (fails == 1.0, _FAIL, "x", "FAIL")):
-        axes.scatter(x[mask], y[mask], s=18, color=color, marker=mark, label=label, alpha=0.5)
+    for mask, color, mark, said in ((fails == 0.0, _PASS, "o", "does not FAIL"), (fails == 1.0, _FAIL, "x", "FAIL")):
+        axes.scatter(x[mask], y[mask], s=18, color=color, marker=mark, label=said, alpha=0.5)
     if rest:
-        third = results.numbers(rest[0])[front]
+        text, size = label(rest[0])
+        third = results.numbers(rest[0])[front] / size
         dots = axes.scatter(
             x[front], y[front], s=70, c=third, cmap="viridis", edgecolors="black", label="Pareto front", zorder=3
         )
-        figure.colorbar(dots, label=rest[0])
+        figure.colorbar(dots, label=text)
     else:
         axes.plot(x[front], y[front], "o-", color=_FRONT, label="Pareto front", zorder=3)
-    axes.set(xlabel=x_name, ylabel=y_name)
+    axes.set(xlabel=x_text, ylabel=y_text)
     axes.grid(alpha=0.3)
     axes.legend(frameon=False)
     return figure

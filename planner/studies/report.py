@@ -8,6 +8,7 @@ from typing import Any
 from planner.reports.markdown import section, table
 from planner.studies.analysis import CONFIDENCE, FAILS, Index, Probability, ResponseSummary, Results
 from planner.studies.designs import DesignKind
+from planner.studies.responses import label
 from planner.studies.sample import INFEASIBLE, REFUSED
 from planner.studies.tables import Value
 
@@ -59,19 +60,20 @@ def summaries(results: Results) -> tuple[ResponseSummary, ...]:
     )
 
 
+def told(header: Sequence[str], rows: Sequence[Sequence[str]]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of a table without the columns that hold "-" in every row."""
+    kept = [i for i in range(len(header)) if not rows or any(row[i] != "-" for row in rows)]
+    return tuple(header[i] for i in kept), [tuple(row[i] for i in kept) for row in rows]
+
+
 def response_rows(found: Sequence[ResponseSummary]) -> list[tuple[str, ...]]:
     """Return the rows of RESPONSE_HEADER."""
-    return [
-        (
-            each.name,
-            "-" if each.nominal is None else _number(each.nominal),
-            *(_number(q) for q in each.quantiles),
-            _number(each.deviation),
-            "-" if each.first_order is None else _number(each.first_order),
-            decided_by(each),
-        )
-        for each in found
-    ]
+    rows = []
+    for each in found:
+        name, size = label(each.name)
+        figures = (each.nominal, *each.quantiles, each.deviation, each.first_order)
+        rows.append((name, *("-" if x is None else _number(x / size) for x in figures), decided_by(each)))
+    return rows
 
 
 def decided_by(found: ResponseSummary) -> str:
@@ -90,9 +92,9 @@ def index_rows(results: Results, indices: Sequence[Index]) -> list[tuple[str, ..
         (
             index.factor,
             f"{index.first:.3f}",
-            f"{index.first_error:.3f}",
+            f"{index.first_error:.3f}" if index.first_error else "-",
             "-" if index.total is None else f"{index.total:.3f}",
-            "-" if index.total_error is None else f"{index.total_error:.3f}",
+            f"{index.total_error:.3f}" if index.total_error else "-",
             laws[index.factor],
         )
         for index in indices
@@ -100,10 +102,17 @@ def index_rows(results: Results, indices: Sequence[Index]) -> list[tuple[str, ..
 
 
 def level_rows(results: Results) -> list[tuple[str, ...]]:
-    """Return the rows of LEVEL_HEADER, for factors of few levels."""
-    few = {factor.name for factor in results.study.design.factors if len(factor.levels) <= _FEW}
+    """Return the rows of LEVEL_HEADER, for factors of several levels but few."""
+    few = {factor.name for factor in results.study.design.factors if 1 < len(factor.levels) <= _FEW}
+    grid = results.study.design.kind is DesignKind.GRID
     return [
-        (name, level, percent(found.estimate), f"{percent(found.low)} to {percent(found.high)}", f"{found.samples:,}")
+        (
+            name,
+            level,
+            percent(found.estimate),
+            "-" if grid else f"{percent(found.low)} to {percent(found.high)}",
+            f"{found.samples:,}",
+        )
         for name, level, found in results.by_level()
         if name in few and found is not None
     ]
@@ -132,18 +141,29 @@ def boundary_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ..
     return (*others, f"largest {name}", "then the limit is"), rows
 
 
-def front_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return header and rows of the Pareto front; no rows where the study has none."""
+def front_points(results: Results) -> list[dict[str, Value]]:
+    """Return the points of the Pareto front: the responses of which the least are sought, and the factors that vary.
+
+    () where the study has none.
+    """
     study = results.study
     if not study.pareto:
-        return (), []
-    names = [factor.name for factor in study.design.factors if len(factor.levels) != 1]
-    columns = [results.numbers(name) for name in study.pareto]
-    rows = []
-    for i in results.front(study.pareto):
-        values = dict(zip((factor.name for factor in study.design.factors), study.design.values(int(i)), strict=True))
-        rows.append((*(_number(column[i]) for column in columns), *(_value(values[name]) for name in names)))
-    return (*study.pareto, *names), rows
+        return []
+    names = [factor.name for factor in study.design.factors]
+    varied = {factor.name for factor in study.design.factors if len(factor.levels) != 1}
+    points = []
+    for i in map(int, results.front(study.pareto)):
+        values = zip(names, study.design.values(i), strict=True)
+        own: dict[str, Value] = {name: float(results.numbers(name)[i]) for name in study.pareto}
+        points.append(own | {name: value for name, value in values if name in varied})
+    return points
+
+
+def front_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return header and rows of the Pareto front as people read it; no rows where the study has none."""
+    points = front_points(results)
+    header = tuple(label(name)[0] for name in points[0]) if points else ()
+    return header, [tuple(_value(value, label(name)[1]) for name, value in point.items()) for point in points]
 
 
 def notes(results: Results) -> tuple[str, ...]:
@@ -160,13 +180,15 @@ def to_markdown(results: Results) -> str:
     """Return the report of a study."""
     asked, how, answer = sentences(results)
     found = summaries(results)
-    lines = [f"# {asked}", "", how, "", answer, "", "## Responses", "", *table(RESPONSE_HEADER, response_rows(found))]
-    lines += ["", "*First order* is the standard deviation by first-order propagation of the factors' deviations."]
+    lines = [f"# {asked}", "", how, "", answer, "", "## Responses", ""]
+    lines += table(*told(RESPONSE_HEADER, response_rows(found)))
+    if any(each.first_order is not None for each in found):
+        lines += ["", "*First order* is the standard deviation by first-order propagation of the factors' deviations."]
     for name, indices in _indexed(results, found):
-        lines += ["", f"## What decides {name}", "", *table(INDEX_HEADER, index_rows(results, indices))]
+        lines += ["", f"## What decides {label(name)[0]}", "", *table(*told(INDEX_HEADER, index_rows(results, indices)))]
     levels = level_rows(results)
     if levels:
-        lines += ["", "## By level", "", *table(LEVEL_HEADER, levels)]
+        lines += ["", "## By level", "", *table(*told(LEVEL_HEADER, levels))]
     if results.study.design.kind is not DesignKind.GRID:
         header, rows = combination_rows(results)
         if rows:
@@ -176,7 +198,12 @@ def to_markdown(results: Results) -> str:
         lines += ["", f"## How large {results.study.boundary} may be", "", *table(header, rows)]
     header, rows = front_rows(results)
     if rows:
-        lines += ["", f"## Pareto front of least {', '.join(results.study.pareto)}", "", *table(header, rows)]
+        lines += [
+            "",
+            f"## Pareto front of least {', '.join(label(name)[0] for name in results.study.pareto)}",
+            "",
+            *table(header, rows),
+        ]
     lines += section("Factors and notes", notes(results))
     return "\n".join(lines) + "\n"
 
@@ -185,7 +212,6 @@ def to_json(results: Results, files: dict[str, str]) -> dict[str, Any]:
     """Return the JSON object of `boom study`, in SI."""
     study, found = results.study, results.fails()
     responses = [asdict(each) | {"indices": [asdict(index) for index in each.indices]} for each in summaries(results)]
-    header, rows = front_rows(results)
     return {
         "study": study.name,
         "question": study.question,
@@ -207,7 +233,7 @@ def to_json(results: Results, files: dict[str, str]) -> dict[str, Any]:
         ],
         "boundary": [asdict(each) for each in results.boundary()],
         "responses": responses,
-        "pareto": [dict(zip(header, row, strict=True)) for row in rows],
+        "pareto": front_points(results),
         "factors": [
             {"name": f.name, "keys": list(f.keys), "law": f.law, "basis": f.basis, "source": f.source}
             for f in study.design.factors
@@ -233,5 +259,5 @@ def _number(value: float) -> str:
     return f"{float(f'{value:.4g}'):.12g}"
 
 
-def _value(value: Value) -> str:
-    return _number(value) if isinstance(value, float) else str(value)
+def _value(value: Value, size: float) -> str:
+    return _number(value / size) if isinstance(value, float) else str(value)

@@ -1,46 +1,69 @@
 """Responses of a sample: the columns of the dataset that the mission's checks give."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from boom_model import Boom
+from boom_model import Boom, InputError
 from boom_model.drives.linear_actuator import LinearDrive
+from boom_model.words import nearest_name
+from planner.checks.energy import Energy
+from planner.checks.evaluation import Evaluation
 from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Row, Verdict, overall
-from planner.missions.mission import Cycle
+from planner.missions.mission import Cycle, cycle_energy
 from planner.reports.answer import usage
 
 Columns = Iterator[tuple[str, Any]]
 
-UNITS = {
-    "duration_s": "s",
-    "moving_s": "s",
-    "tip_error_m": "m",
-    "bodies_kg": "kg",
-    "drives_kg": "kg",
-    "mass_kg": "kg",
-    "link_kg": "kg",
-    "used": "",
+LABELS = {
+    "duration_s": ("duration [s]", 1.0),
+    "moving_s": ("time in motion [s]", 1.0),
+    "tip_error_m": ("tip error [mm]", 1e-3),
+    "bodies_kg": ("mass of the bodies [kg]", 1.0),
+    "drives_kg": ("mass of the drives [kg]", 1.0),
+    "mass_kg": ("mass [kg]", 1.0),
+    "link_kg": ("mass of the link [kg]", 1.0),
+    "energy_J": ("energy [Wh]", 3600.0),
+    "lost_J": ("energy lost [Wh]", 3600.0),
+    "peak_W": ("peak power [W]", 1.0),
 }
-"""Numeric responses of every study, with their units; the rows' own columns come beside them."""
+"""What people read in place of a column's name, and the size of its unit in SI."""
 
 
-def responses(boom: Boom, cycle: Cycle, rows: Sequence[Row], joints: Sequence[str]) -> dict[str, Any]:
+def label(name: str) -> tuple[str, float]:
+    """Return what people read in place of a column's name, and the size of its unit in SI."""
+    return LABELS.get(name, (name, 1.0))
+
+
+def unknown_response(name: str, known: Iterable[str]) -> InputError:
+    """Return the error of a response that no sample has; the nearest of the known ones is suggested."""
+    meant = nearest_name(name, known)
+    hint = "every column of the dataset that holds numbers is one" if meant is None else f"did you mean {meant}?"
+    return InputError(f"unknown response {name!r}; {hint}")
+
+
+def responses(evaluation: Evaluation, cycle: Cycle, rows: Sequence[Row], joints: Sequence[str]) -> dict[str, Any]:
     """Return the columns of a sample.
 
     Args:
-        boom: the sample's boom.
+        evaluation: the sample's boom on the mission's cycle.
         cycle: the mission as planned for it.
         rows: all checks of the cycle.
         joints: joints whose rows decide `verdict`, `used`, `tightest` and `failing`; () is all.
     """
     found: dict[str, Any] = {}
-    for group in RESPONSES:
-        found.update(group(boom, cycle, rows, joints))
+    for group in (
+        _decision(rows, joints),
+        _times(cycle),
+        _masses(evaluation.boom),
+        _energies(cycle_energy(cycle, evaluation)),
+        _rows(rows),
+    ):
+        found.update(group)
     return found
 
 
-def _decision(_: Boom, __: Cycle, rows: Sequence[Row], joints: Sequence[str]) -> Columns:
+def _decision(rows: Sequence[Row], joints: Sequence[str]) -> Columns:
     """Yield the verdict, which rows fail, and the largest share that is used of a limit.
 
     A joint's speed and acceleration limits are left out of that share: the plan keeps them by
@@ -56,7 +79,7 @@ def _decision(_: Boom, __: Cycle, rows: Sequence[Row], joints: Sequence[str]) ->
     yield "failing", ", ".join(_name(row) for row in deciding if row.verdict is Verdict.FAIL)
 
 
-def _times(_: Boom, cycle: Cycle, __: Sequence[Row], ___: Sequence[str]) -> Columns:
+def _times(cycle: Cycle) -> Columns:
     yield "duration_s", cycle.duty.duration
     yield (
         "moving_s",
@@ -64,7 +87,7 @@ def _times(_: Boom, cycle: Cycle, __: Sequence[Row], ___: Sequence[str]) -> Colu
     )
 
 
-def _masses(boom: Boom, _: Cycle, __: Sequence[Row], ___: Sequence[str]) -> Columns:
+def _masses(boom: Boom) -> Columns:
     """Yield the masses of bodies and drives; a boom's file does not say whether its bodies include their drives."""
     drives = [mass for drive in (*boom.drives, boom.actuator) if drive is not None and (mass := _drive_mass(drive)) is not None]
     yield "bodies_kg", boom.mass
@@ -72,7 +95,22 @@ def _masses(boom: Boom, _: Cycle, __: Sequence[Row], ___: Sequence[str]) -> Colu
     yield "mass_kg", boom.mass + float(sum(drives))
 
 
-def _rows(_: Boom, __: Cycle, rows: Sequence[Row], ___: Sequence[str]) -> Columns:
+def _energies(energy: Energy) -> Columns:
+    """Yield what a cycle takes from the supply, what of it is lost, and the peak power.
+
+        lost = energy - (driving - braking - friction)
+
+    of the joints whose drive has data. What is not lost moves the bodies. A loss is in the
+    windings, drivers, gears, joints and brake resistor. None where no drive has data.
+    """
+    known = [joint for joint in energy.joints if joint.electrical is not None]
+    kept = sum(joint.driving - joint.braking - joint.friction for joint in known)
+    yield "energy_J", energy.drawn
+    yield "lost_J", None if energy.drawn is None else energy.drawn - kept
+    yield "peak_W", energy.peak_W
+
+
+def _rows(rows: Sequence[Row]) -> Columns:
     """Yield the tip's error, and for every row that has them its margin and the share of its limit that is used."""
     for row in rows:
         if row.kind is CheckKind.TIP_DEFLECTION:
@@ -82,10 +120,6 @@ def _rows(_: Boom, __: Cycle, rows: Sequence[Row], ___: Sequence[str]) -> Column
             yield f"used: {_name(row)}", share
         if row.margin is not None:
             yield f"margin: {_name(row)}", row.margin
-
-
-RESPONSES: tuple[Callable[[Boom, Cycle, Sequence[Row], Sequence[str]], Columns], ...] = (_decision, _times, _masses, _rows)
-"""Groups of columns. Another response is another function here."""
 
 
 def _name(row: Row) -> str:

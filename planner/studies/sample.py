@@ -12,8 +12,8 @@ from planner.checks.motion_checks import check_rows
 from planner.checks.rows import Verdict
 from planner.missions.mission import Mission, mission_of, plan_cycle
 from planner.studies.designed_link import link_task, with_designed_link
-from planner.studies.responses import responses
-from planner.studies.study import Case, Inputs
+from planner.studies.responses import LABELS, responses, unknown_response
+from planner.studies.study import Case, Inputs, Study
 from planner.studies.tables import Tree, Value, filled, get, put, scaled
 
 if TYPE_CHECKING:
@@ -47,13 +47,31 @@ def compute(case: Case, values: Sequence[Value]) -> dict[str, Any]:
         return {"status": REFUSED, "reason": f"the numbers are beyond what can be computed: {error}", "verdict": None}
 
 
+def check_responses(study: Study) -> None:
+    """Check by the first point of a study that its responses are numbers that samples have.
+
+    A first point without an answer tells nothing.
+
+    Raises:
+        InputError: a response or a name of the Pareto front is unknown, or no number.
+    """
+    found = compute(study.case, study.design.values(0))
+    if found["status"] != DONE:
+        return
+    for name in (*study.responses, *study.pareto):
+        if name not in found and name not in LABELS:
+            raise unknown_response(name, found)
+        if isinstance(found.get(name), str):
+            raise InputError(f"response {name}: it is not a number")
+
+
 def compute_chunk(case: Case, points: Points, seed: int) -> "pa.Table":
     """Return the rows of some points as a table, one row a point, refused ones among them."""
     import pyarrow as pa
 
     rows = []
     for index, point, values in points:
-        factors = {factor.name: value for factor, value in zip(case.factors, values, strict=True)}
+        factors = {f.name: value if f.numeric else str(value) for f, value in zip(case.factors, values, strict=True)}
         fixed = {"sample": index, "point": point, "seed": seed, **factors}
         rows.append({**fixed, "tightest": None, "failing": None, **compute(case, values)})
     names = list(dict.fromkeys(name for row in rows for name in row))
@@ -96,7 +114,7 @@ def _answer(case: Case, values: Sequence[Value]) -> dict[str, Any]:
         cycle = plan_cycle(boom, mission, step=case.step)
     bears = boom.mount.force is not None or boom.mount.moment is not None
     evaluation = at_samples(boom, cycle.trajectory, reactions=bears)
-    found = responses(boom, cycle, check_rows(evaluation, cycle.duty), case.joints)
+    found = responses(evaluation, cycle, check_rows(evaluation, cycle.duty), case.joints)
     return found if link_mass is None else {**found, "link_kg": link_mass}
 
 
@@ -119,16 +137,12 @@ def _with_profile(steps: Any, profile: Value) -> list[Any]:
 
 
 def _column(values: list[Any]) -> "pa.Array":
-    """Return a column of numbers, texts, truth values or nothing at all, of a type that does not depend on the chunk."""
+    """Return a column of numbers, texts or nothing at all, of a type that does not depend on the chunk."""
     import pyarrow as pa
 
     known = [value for value in values if value is not None]
     if not known:
         return pa.nulls(len(values))
-    if all(isinstance(value, bool) for value in known):
-        return pa.array(values, pa.bool_())
     if all(type(value) is int for value in known):
         return pa.array(values, pa.int64())
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in known):
-        return pa.array(values, pa.float64())
-    return pa.array([None if value is None else str(value) for value in values], pa.string())
+    return pa.array(values, pa.string() if isinstance(known[0], str) else pa.float64())

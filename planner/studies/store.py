@@ -5,7 +5,7 @@ import hashlib
 import json
 import pickle
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _LIBRARIES = ("boom", "numpy", "scipy", "toppra", "ruckig", "clarabel", "pyarrow")
 _STATE = "study.json"
+_GROUP = 8192
+"""Rows of a row group of the dataset: few enough to be held in memory."""
 
 
 class Store:
@@ -102,7 +104,7 @@ class Store:
             pq.write_table(table, temporary)
 
     def join(self, path: str | Path) -> None:
-        """Write all chunks as one Parquet file, a row group each; the file depends on the study alone.
+        """Write all chunks as one Parquet file. It depends on the study alone, not on its chunks' size.
 
         Raises:
             InputError: it cannot be written.
@@ -113,18 +115,11 @@ class Store:
         parts = [self._part(chunk) for chunk in range(self.chunks)]
         whole = pa.unify_schemas([pq.read_schema(part).remove_metadata() for part in parts], promote_options="permissive")
         whole = pa.schema([field if field.type != pa.null() else pa.field(field.name, pa.string()) for field in whole])
-        about = {"study": self.study.name, "question": self.study.question, "seed": str(self.study.seed)}
+        whole = whole.with_metadata({"study": self.study.name, "question": self.study.question, "seed": str(self.study.seed)})
         try:
-            with pq.ParquetWriter(path, whole.with_metadata(about)) as writer:
-                for part in parts:
-                    table = pq.read_table(part)
-                    columns = [
-                        table[field.name].cast(field.type)
-                        if field.name in table.column_names
-                        else pa.nulls(len(table), field.type)
-                        for field in whole
-                    ]
-                    writer.write_table(pa.table(columns, schema=whole.with_metadata(about)))
+            with pq.ParquetWriter(path, whole) as writer:
+                for group in _groups(_conforming(pq.read_table(part), whole) for part in parts):
+                    writer.write_table(group)
         except OSError as error:
             raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
 
@@ -134,6 +129,31 @@ class Store:
 
     def _part(self, chunk: int) -> Path:
         return self.folder / f"{chunk:07d}.parquet"
+
+
+def _conforming(table: "pa.Table", schema: "pa.Schema") -> "pa.Table":
+    """Return a table with the columns of a schema; those that it lacks are empty."""
+    import pyarrow as pa
+
+    known = set(table.column_names)
+    columns = [
+        table[field.name].cast(field.type) if field.name in known else pa.nulls(len(table), field.type) for field in schema
+    ]
+    return pa.table(columns, schema=schema)
+
+
+def _groups(tables: "Iterable[pa.Table]") -> "Iterator[pa.Table]":
+    """Yield the rows of tables of one schema in tables of _GROUP rows, and the rest."""
+    import pyarrow as pa
+
+    rest: pa.Table | None = None
+    for table in tables:
+        rest = table if rest is None else pa.concat_tables([rest, table])
+        while len(rest) >= _GROUP:
+            yield rest.slice(0, _GROUP).combine_chunks()
+            rest = rest.slice(_GROUP)
+    if rest is not None and len(rest):
+        yield rest.combine_chunks()
 
 
 def _state(study: Study) -> dict[str, str]:

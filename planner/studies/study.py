@@ -24,6 +24,10 @@ from planner.studies.tables import Tree, Value, is_numeric, merged, require_key,
 from planner.timing.profile import SHORTEST
 
 _FOLDER = Path(str(files("planner.studies") / "named_studies"))
+_CHUNKS = 100
+_LEAST_CHUNK, _MOST_CHUNK = 10, 250
+"""Samples of a chunk, where a study of about _CHUNKS of them would have fewer or more."""
+
 SHORT_KEYS = ("payload", "profile")
 """Keys without a file: the mass at the tip with its inertia, and the profile of every move."""
 
@@ -88,7 +92,7 @@ class _StudyTable(Table):
     design: DesignKind = Field(strict=False)
     samples: Annotated[int, Field(ge=1)] = 1
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 1
-    chunk: Annotated[int, Field(ge=1, le=100_000)] = 50
+    chunk: Annotated[int, Field(ge=1, le=100_000)] | None = None
     step_s: Annotated[float, Field(ge=1e-4, le=1.0)] = STEP
     responses: list[str] = Field(default_factory=lambda: ["used", "duration_s", "tip_error_m"])
     pareto: list[str] = Field(default_factory=list)
@@ -150,6 +154,7 @@ class Study:
     """As the file or the command gives them."""
     seed: int
     chunk: int
+    """Samples that a process computes at a time. The dataset does not depend on it."""
     responses: tuple[str, ...]
     pareto: tuple[str, ...]
     """Responses of which the least are sought; () is none."""
@@ -194,6 +199,7 @@ def load_study(
     factors = tuple(_factor(f, inputs, str(file)) for f in table.factors)
     count = table.samples if samples is None else samples
     start = table.seed if seed is None else seed
+    points = design(table.design, factors, count, start)
     if table.move is None:
         work = f"mission {table.mission}"
     else:
@@ -203,10 +209,10 @@ def load_study(
         question=table.question,
         work=work,
         case=Case(inputs, factors, tuple(table.joints), table.step_s),
-        design=design(table.design, factors, count, start),
+        design=points,
         samples=count,
         seed=start,
-        chunk=table.chunk,
+        chunk=table.chunk or min(max(len(points) // _CHUNKS, _LEAST_CHUNK), _MOST_CHUNK),
         responses=tuple(table.responses),
         pareto=tuple(table.pareto),
         boundary=_bounded(table.boundary, factors, str(file)),

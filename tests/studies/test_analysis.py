@@ -9,6 +9,7 @@ from boom_model import InputError
 from planner.studies.analysis import FAILS
 from planner.studies.designs import DesignKind
 from planner.studies.factors import Factor
+from planner.studies.report import front_rows, response_rows, to_json, told
 from tests.studies.helpers import normal, results_of, uniform
 
 G = np.array([0.0, 1.0, 4.5, 9.0])
@@ -56,6 +57,25 @@ def test_sobol_indices_are_the_closed_form_ones_within_their_errors(tmp_path, na
         assert abs(index.total - total[i]) <= index.total_error + 1e-9, index
         assert index.total_error < 0.1
         assert index.first_error < 0.12
+
+
+def test_a_grid_gives_exact_shares_of_the_variance(tmp_path):
+    """Of y = a + 2 b + a b on levels a = -1, 1 and b = -1, 0, 1: variances 1, 8/3 and 2/3."""
+    factors = [
+        Factor("a", (), False, levels=(-1.0, 1.0)),
+        Factor("b", (), False, levels=(-1.0, 0.0, 1.0)),
+        Factor("c", (), False, levels=("only",)),
+    ]
+    parts = np.array([1.0, 8.0 / 3.0, 2.0 / 3.0])
+    made = results_of(
+        tmp_path, lambda x: (2 * x[:, 0] - 1) + (x[:, 1] - 1) * (2 + (2 * x[:, 0] - 1)), factors, DesignKind.GRID, 1
+    )
+    b, a = made.indices("y")
+    assert (a.factor, b.factor) == ("a", "b")
+    whole = parts.sum()
+    np.testing.assert_allclose([a.first, b.first], parts[:2] / whole, rtol=1e-12)
+    np.testing.assert_allclose([a.total, b.total], (parts[:2] + parts[2]) / whole, rtol=1e-12)
+    assert told(("a", "b"), [("-", "1"), ("-", "-")]) == (("b",), [("1",), ("-",)])
 
 
 def test_given_data_gives_first_order_indices_of_any_random_design(tmp_path):
@@ -160,3 +180,15 @@ def test_an_unknown_response_is_named_with_the_nearest(tmp_path):
     made = results_of(tmp_path, lambda x: x[:, 0], [uniform("a", 0.0, 1.0)], DesignKind.SOBOL, 8)
     with pytest.raises(InputError, match="unknown response 'statu'; did you mean status"):
         made.summary("statu")
+
+
+def test_people_read_units_and_files_hold_si(tmp_path):
+    factors = [Factor("a", (), False, levels=(0.0, 1.0, 2.0)), Factor("word", (), False, levels=("only",))]
+    energy = {"energy_J": np.array([7200.0, 3600.0, 10_800.0])}
+    pareto = ("y", "energy_J")
+    made = results_of(tmp_path, lambda x: x[:, 0], factors, DesignKind.GRID, 1, pareto=pareto, more=energy)
+    assert front_rows(made) == (("y", "energy [Wh]", "a"), [("0", "2", "0"), ("1", "1", "1")])
+    assert to_json(made, {})["pareto"] == [{"y": 0.0, "energy_J": 7200.0, "a": 0.0}, {"y": 1.0, "energy_J": 3600.0, "a": 1.0}]
+    found = made.summary("energy_J")
+    assert (found.name, found.quantiles[1]) == ("energy_J", 7200.0)
+    assert response_rows([found])[0][:4] == ("energy [Wh]", "-", "1.1", "2")

@@ -51,6 +51,32 @@ def test_every_sample_refused_is_the_answer_no(boom, tmp_path):
     assert err == "boom: no sample could be checked: every one was refused\n"
 
 
+@pytest.mark.parametrize(
+    ("responses", "said"),
+    [
+        ('responses = ["usd"]', "unknown response 'usd'; did you mean used?"),
+        ('responses = ["verdict"]', "response verdict: it is not a number"),
+        ('responses = ["used"]\npareto = ["mas_kg", "used"]', "unknown response 'mas_kg'; did you mean mass_kg?"),
+    ],
+)
+def test_a_wrong_response_is_named_before_anything_is_computed(boom, tmp_path, responses, said):
+    (tmp_path / "s.toml").write_text(SMALL.format(samples=100_000).replace('responses = ["used"]', responses))
+    assert boom("study", "s.toml") == (2, "", f"boom: {said}\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["s.toml"]
+
+
+def test_samples_that_all_have_no_motion_fail(boom, tmp_path):
+    hasty = SMALL.replace('mission = "table-3-1"', '[move]\nstart = "transport"\ngoal = "phenotyping"\nduration_s = 0.1\n')
+    head, _, rest = hasty.format(samples=6).partition("[move]")
+    move, _, rest = rest.partition("joints = ")
+    keys, _, factors = rest.partition("[[factors]]")
+    (tmp_path / "s.toml").write_text(f"{head}joints = {keys}[move]{move}\n[[factors]]{factors}")
+    code, out, err = boom("study", "s.toml", "--workers", "1")
+    assert (code, err) == (0, "")
+    assert "FAIL: 100 % of 6" in out
+    assert "11 without a motion, 0 refused" in out
+
+
 def test_a_missing_extra_is_named(boom, small, tmp_path, monkeypatch):
     (tmp_path / "s.toml").write_text(SMALL.format(samples=8).replace("monte-carlo", "sobol-indices"))
     real = builtins.__import__

@@ -98,6 +98,32 @@ def test_a_row_is_its_sample_computed_alone(folder):
         assert {name: row[name] for name in alone} == alone
 
 
+def test_the_dataset_does_not_depend_on_the_size_of_chunks(folder, monkeypatch):
+    """Nor do its types: a factor of numbers and words, and a refused sample that has no response."""
+    monkeypatch.setattr("planner.studies.store._GROUP", 16)
+    made = []
+    for chunk in (3, 16, 50):
+        text = SMALL.format(samples=30).replace("chunk = 5", f"chunk = {chunk}").replace("std = 1.0", "std = 8.0")
+        mixed = '\n[[factors]]\nname = "mixed"\nkey = "boom.name"\nvalues = ["a", 1.5]\nsource = "this test"\n'
+        (folder / "chunks.toml").write_text(text + mixed)
+        store = Store(folder / "chunks.parquet", load_study(str(folder / "chunks.toml")))
+        with store.opened(resume=False):
+            run(store, workers=1)
+            store.join(folder / "chunks.parquet")
+            store.remove()
+        made.append((folder / "chunks.parquet").read_bytes())
+    assert made[0] == made[1] == made[2]
+    table = pq.read_table(folder / "chunks.parquet")
+    assert set(table["mixed"].to_pylist()) == {"a", "1.5"}
+    assert set(table["status"].to_pylist()) == {"done", "infeasible", "refused"}
+
+
+def test_chunks_grow_with_the_study_up_to_a_bound(folder):
+    (folder / "plain.toml").write_text(SMALL.format(samples=8).replace("chunk = 5\n", ""))
+    sizes = [load_study(str(folder / "plain.toml"), samples=samples).chunk for samples in (8, 2000, 100_000)]
+    assert sizes == [10, 20, 250]
+
+
 def test_an_interrupted_run_goes_on_with_nothing_computed_twice(folder):
     with pytest.raises(KeyboardInterrupt):
         make(folder, "stopped.parquet", track=stopped_after(7))

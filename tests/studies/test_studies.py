@@ -11,6 +11,8 @@ from boom_model import Boom, Catalogue, InputError, gravity_torque
 from boom_model.boom_file import BOOM_FILE
 from boom_model.link_design.link import LINKS_FILE
 from boom_model.toml_file import parse_toml
+from planner.checks.energy import joint_powers
+from planner.checks.evaluation import at_samples
 from planner.checks.rows import SAMPLING_SLACK
 from planner.links.design import design_link
 from planner.links.task import LinkTask
@@ -171,6 +173,31 @@ def test_an_unchanged_sample_is_the_mission_itself(loaded):
     assert found["verdict"] == report.verdict
     tip = next(row for row in report.rows if row.check == "deflection in all")
     assert found["tip_error_m"] == tip.demand
+    for row in report.rows:
+        assert found.get(f"margin: {row.joint} {row.check}") == row.margin
+    assert report.energy is not None
+    assert (found["energy_J"], found["peak_W"]) == (report.energy.drawn, report.energy.peak_W)
+
+
+def test_energy_lost_is_the_sum_of_all_losses(loaded):
+    """In windings, gears, friction, drivers and brake resistor, each integrated on its own."""
+    more = (
+        '[boom.joints.inner.friction]\nviscous_Nm_s_per_rad = 3.0\ncoulomb_Nm = 2.0\nbasis = "assumed"\nsource = "this test"\n'
+    )
+    case = loaded(more=more).case
+    boom, mission, _ = make(case, (10.0, 1.0))
+    cycle = plan_cycle(boom, mission, step=case.step)
+    evaluation = at_samples(boom, cycle.trajectory)
+    powers = [power for power in joint_powers(evaluation) if power.electrical is not None]
+    shafts = [power.output + power.rotor + power.gear_loss + power.copper for power in powers]
+    losses = sum(power.friction + power.gear_loss + power.copper for power in powers)
+    losses = losses + sum(np.maximum(s / 0.9 - s, 0.0) + np.maximum(0.9 * s - s, 0.0) for s in shafts)
+    losses = losses + np.maximum(-sum(power.electrical for power in powers), 0.0)
+    found = compute(case, (10.0, 1.0))
+    rotors = np.trapezoid(sum(power.rotor for power in powers), evaluation.t)
+    assert abs(rotors) < 1e-6 * found["lost_J"]  # they start and end at rest
+    assert found["lost_J"] == pytest.approx(np.trapezoid(losses, evaluation.t), rel=1e-6)
+    assert 0.0 < found["lost_J"] < found["energy_J"]
 
 
 def test_what_makes_no_boom_is_a_row_with_its_reason(loaded):
