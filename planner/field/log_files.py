@@ -65,6 +65,21 @@ class Triggers:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Positions of one point, measured from outside or by a second receiver."""
+
+    t: Array
+    """(n,) [s]"""
+    ecef: Array
+    """(n, 3) [m]"""
+    std: Array
+    """(n,) of each coordinate [m]"""
+    clock: str
+    source: str
+    notes: tuple[str, ...] = ()
+
+
 def read_vehicle_log(path: str | Path, epsg: int | None = None, longest_gap: float | None = None) -> VehicleLog:
     """Read the log of a vehicle: NMEA if it begins with `$` or `!`, otherwise CSV.
 
@@ -142,7 +157,36 @@ def read_triggers(path: str | Path) -> Triggers:
     return Triggers(read_only(t), tuple(labels), clock, str(path), notes)
 
 
-def require_one_clock(*logs: VehicleLog | JointLog | Triggers) -> None:
+def read_points(path: str | Path, epsg: int | None = None) -> Points:
+    """Read measured positions of a point: NMEA, or CSV with the time and position columns of a vehicle's log.
+
+    Args:
+        path: the file.
+        epsg: reference system of easting_m and northing_m.
+
+    Raises:
+        InputError: it cannot be read or is malformed; names the line and what is wrong.
+    """
+    if _is_nmea(path):
+        log = read_nmea(path)
+        return Points(log.t, log.ecef, _mean_std(log.position_covariance), log.clock, str(path), log.notes)
+    table, notes = read_table(path, VEHICLE_COLUMNS)
+    table, lost = _with_fix(table)
+    t, clock = table.times()
+    table, t, doubled = _without_doubles(table, t)
+    latitude, longitude, height, placed = _position(table, epsg)
+    covariance, assumed = _position_covariance(table)
+    ecef, std = ecef_of(latitude, longitude, height), _mean_std(covariance)
+    return Points(read_only(t), read_only(ecef), read_only(std), clock, str(path), (*notes, *lost, *doubled, *placed, *assumed))
+
+
+def _mean_std(covariance: Array) -> Array:
+    """Return the root mean square (n,) of the standard deviations of covariances (n, 3, 3)."""
+    std: Array = np.sqrt(np.trace(covariance, axis1=-2, axis2=-1) / 3.0)
+    return std
+
+
+def require_one_clock(*logs: VehicleLog | JointLog | Triggers | Points) -> None:
     """Check that all logs have one clock.
 
     Raises:

@@ -18,6 +18,7 @@ from pydantic import Field
 from boom_model import InputError
 from boom_model.arrays import Array
 from boom_model.plausible import Range
+from boom_model.provenance import BasisName
 from boom_model.toml_file import Table, read_toml
 from planner.field.earth import GEOGRAPHIC, datum_note, ecef_from, geodetic_of, reference_system
 from planner.field.extra import library
@@ -38,7 +39,7 @@ _Count = Annotated[int, Field(ge=1, le=10_000)]
 
 class _Trial(Table):
     name: str
-    basis: Literal["printed", "estimated", "assumed"]
+    basis: BasisName
     source: str
     rows: _Count
     ranges: _Count

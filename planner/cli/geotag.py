@@ -1,0 +1,257 @@
+"""Where a sensor was at every trigger, and the rig measured from a manoeuvre."""
+
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+
+from boom_model.plausible import OFFSET, Range
+from planner.cli.completion import OutFile
+from planner.cli.options import (
+    EPSG,
+    all_option,
+    boom_option,
+    epsg_option,
+    figure_option,
+    json_option,
+    load_boom,
+    outputs,
+    payload_option,
+    plausible,
+    with_names,
+)
+from planner.cli.printing import print_files, print_json, print_lines, print_rows
+
+if TYPE_CHECKING:
+    from boom_model.arrays import Array
+    from planner.field.manoeuvre import Measured
+    from planner.field.plots import Located, PlotMap
+    from planner.field.sensor_tags import SensorTags
+
+_GAP = Range(1e-3, 1e4, "s")
+_FEW = 3
+_SHOWN = {"s": (1e3, "ms"), "m": (1e3, "mm"), "rad": (float(np.degrees(1.0)), "deg")}
+
+_rig_option = click.option(
+    "--rig", required=True, type=click.Path(), metavar="RIG.toml", help="What stands where on the vehicle."
+)
+_gap_option = figure_option("--gap", _GAP, "S", "Longest gap to bridge; default: 3 intervals.")
+
+
+@click.command()
+@click.argument("vehicle", metavar="VEHICLE")
+@click.argument("joints", metavar="JOINTS.csv")
+@click.argument("triggers", metavar="TRIGGERS.csv")
+@_rig_option
+@click.option("--plots", type=click.Path(), metavar="MAP", help="Plot map: which plot was seen, and how probably.")
+@click.option("--out", type=OutFile(".csv"), metavar="FILE.csv", help="The tags as a table.")
+@click.option("--geojson", type=OutFile(".geojson", ".json"), metavar="FILE.geojson", help="The tags for QGIS.")
+@click.option("--recording", type=OutFile(".rrd"), metavar="FILE.rrd", help="Vehicle, boom and plots in 3D, and a map.")
+@click.option(
+    "--to-epsg", type=int, callback=plausible(EPSG), metavar="CODE", help="Reference system written; default: the UTM zone."
+)
+@_gap_option
+@epsg_option
+@payload_option
+@boom_option
+@all_option
+@json_option
+def geotag(
+    vehicle: str,
+    joints: str,
+    triggers: str,
+    rig: str,
+    plots: str | None,
+    out: str | None,
+    geojson: str | None,
+    recording: str | None,
+    to_epsg: int | None,
+    gap: float | None,
+    epsg: int | None,
+    payload: float | None,
+    boom_file: str | None,
+    whole: bool,
+    as_json: bool,
+) -> int:
+    """Say where the sensor at the boom's end was at every trigger, what it saw, and how sure that is.
+
+    VEHICLE is CSV or NMEA: time, position, attitude and their deviations. JOINTS has a time and q1..q5.
+    A time is `utc`, `gps_s`, or `t` of one clock for all. Angles: heading clockwise from true north,
+    pitch nose up, roll right side down.
+
+    \b
+    Example:
+      boom geotag vehicle.csv joints.csv triggers.csv --rig rig.toml --plots trial.toml --out tags.csv
+    """
+    from planner.field.log_files import read_joint_log, read_triggers, read_vehicle_log
+    from planner.field.on_plots import locate_spots, map_at, zone_of
+    from planner.field.plot_files import read_plots
+    from planner.field.rig import read_rig
+    from planner.field.sensor_tags import tag_sensor
+    from planner.field.tag_files import rows_of, write_csv, write_geojson
+
+    files = outputs(out, geojson, recording, inputs=(vehicle, joints, triggers, rig, plots, boom_file))
+    boom, placed = load_boom(boom_file, payload), read_rig(rig)
+    tags = tag_sensor(boom, placed, read_vehicle_log(vehicle, epsg, gap), read_joint_log(joints), read_triggers(triggers))
+    field = None if plots is None else map_at(read_plots(plots, None), tags)
+    located = None if field is None else locate_spots(field, tags)
+    code = zone_of(tags) if to_epsg is None else to_epsg
+    rows = rows_of(tags, code, field, located)
+    with files:
+        if out is not None:
+            write_csv(files.temporary(out), rows)
+        if geojson is not None:
+            write_geojson(files.temporary(geojson), tags, rows)
+        if recording is not None:
+            from planner.recording.field import write_field_recording  # slow to import
+
+            write_field_recording(files.temporary(recording), boom, placed, tags, field, located)
+    written = with_names({"tags": out, "map": geojson, "recording": recording})
+    if as_json:
+        print_json({"tags": rows, "epsg": code, "warnings": tags.warnings, "notes": _notes(tags, field), "files": written})
+        return 0
+    _print_tags(tags, field, located, whole)
+    print_files(written)
+    print_lines("next", [] if out else [f"boom geotag {vehicle} {joints} {triggers} --rig {rig} --out tags.csv"])
+    return 0
+
+
+@click.command()
+@click.argument("vehicle", metavar="VEHICLE")
+@click.argument("points", metavar="POINTS")
+@_rig_option
+@click.option("--joints", type=click.Path(), metavar="JOINTS.csv", help="Joint log, if the point is the sensor.")
+@click.option(
+    "--point",
+    metavar="mount|sensor|X,Y,Z",
+    help="What was measured; default: the sensor with --joints, else the mount.",
+)
+@click.option(
+    "--estimate",
+    "words",
+    default="delay,lever-arm",
+    show_default=True,
+    metavar="WORD,...",
+    help="Of delay, points-delay, joints-delay, lever-arm and angles.",
+)
+@click.option("--out", type=OutFile(".toml"), metavar="FILE.toml", help="The rig with what was found.")
+@_gap_option
+@epsg_option
+@payload_option
+@boom_option
+@all_option
+@json_option
+def rig(
+    vehicle: str,
+    points: str,
+    rig: str,
+    joints: str | None,
+    point: str | None,
+    words: str,
+    out: str | None,
+    gap: float | None,
+    epsg: int | None,
+    payload: float | None,
+    boom_file: str | None,
+    whole: bool,
+    as_json: bool,
+) -> int:
+    """Measure the rig: how late the logs are, lever arm and mounting angles, from a manoeuvre.
+
+    The vehicle turned and changed its speed while POINTS, a total station's or a second receiver's positions of one
+    point, were measured. POINTS has a time and a position, as VEHICLE, or is NMEA.
+
+    \b
+    delay         how late VEHICLE's stamps are, POINTS' taken as true
+    points-delay  how late POINTS' stamps are, VEHICLE's taken as true
+    joints-delay  how late JOINTS' stamps are
+    lever-arm     from the antenna to the mount; for a point X,Y,Z of the vehicle, the antenna's place
+    angles        of the mount on the vehicle
+    \b
+    Example:
+      boom rig vehicle.csv points.csv --rig rig.toml --estimate delay,lever-arm --out measured.toml
+    """
+    from planner.field.log_files import read_joint_log, read_points, read_vehicle_log
+    from planner.field.manoeuvre import measure_rig, write_measured
+    from planner.field.rig import read_rig
+
+    files = outputs(out, inputs=(vehicle, points, rig, joints, boom_file))
+    boom, placed = load_boom(boom_file, payload), read_rig(rig)
+    log, seen = read_vehicle_log(vehicle, epsg, gap), read_points(points, epsg)
+    swept = None if joints is None else read_joint_log(joints)
+    asked = ("mount" if joints is None else "sensor") if point is None else point
+    found = measure_rig(boom, placed, log, seen, words.split(","), _point(asked), swept)
+    with files:
+        if out is not None:
+            write_measured(files.temporary(out), rig, found, f"boom rig {vehicle} {points}: {found.sentence}")
+    written = with_names({"rig": out})
+    if as_json:
+        print_json({**found.to_json(), "files": written})
+        return 0
+    print_lines(None, [f"{vehicle} against {points}: {found.sentence}"])
+    _print_figures(found, whole)
+    print_files(written)
+    then = f"boom geotag {vehicle} JOINTS.csv TRIGGERS.csv --rig {out}"
+    print_lines("next", [then if out else f"boom rig {vehicle} {points} --rig {rig} --out measured.toml"])
+    return 0
+
+
+def _point(text: str) -> "str | Array":
+    """Return the measured point of --point: mount, sensor, or a place (3,) on the vehicle."""
+    from boom_model.words import numbers, unknown
+    from planner.field.manoeuvre import MOUNT, SENSOR
+
+    if text in (MOUNT, SENSOR):
+        return text
+    if "," not in text:
+        raise unknown("point", text, [MOUNT, SENSOR])
+    place = np.array(numbers(text, text, 3))
+    OFFSET.require("point", place.tolist())
+    return place
+
+
+def _print_figures(found: "Measured", whole: bool) -> None:
+    rows = []
+    for figure in found.figures:
+        scale, unit = _SHOWN[figure.unit]
+        decimals = 3 if unit == "deg" else 1
+        cells = [f"{value * scale:.{decimals}f} {unit}" for value in (figure.before, figure.found, figure.std)]
+        rows.append((figure.name, *cells))
+    print_rows(("", "rig", "found", "std"), rows)
+    print_lines(None, [found.correlation] if found.correlation else [])
+    print_lines("WARN", found.warnings)
+    print_lines("note", found.notes if whole else [f"{len(found.notes)} notes and assumptions: --all lists them"])
+
+
+def _notes(tags: "SensorTags", field: "PlotMap | None") -> list[str]:
+    return [*tags.notes, *(() if field is None else field.notes)]
+
+
+def _print_tags(tags: "SensorTags", field: "PlotMap | None", located: "Located | None", whole: bool) -> None:
+    from planner.field.on_plots import SURE
+
+    n, known = len(tags.triggers.t), tags.known
+    print_lines(None, [f"{tags.triggers.source}: {n} triggers, {known.sum()} tagged"])
+    rows = []
+    for name, each in (("sensor", tags.sensor), ("what it saw", tags.seen)):
+        at = np.isfinite(each.ecef).all(axis=-1)
+        if not at.any():
+            continue
+        std = np.sqrt(np.diagonal(each.covariance[at], axis1=1, axis2=2))
+        long = each.ellipses[at, 0]
+        worst = [f"{figure * 1e3:.0f} mm" for figure in (np.median(long), np.max(long))]
+        rows.append((name, *(f"{np.median(s) * 1e3:.0f} mm" for s in std.T), *worst))
+    print_rows(("", "std east", "north", "up", "95 % ellipse", "worst"), rows)
+    print_lines(None, [f"sag by the gearboxes: {np.nanmedian(-tags.sag[:, 2]) * 1e3:.1f} mm (median), counted in"])
+    if field is not None and located is not None:
+        sure = int((located.probability >= SURE).sum())
+        plots = len(set(located.plot[located.plot >= 0]))
+        on = int((located.plot >= 0).sum())
+        print_lines(None, [f"{on} spots on {plots} of {len(field.names)} plots, {sure} with a probability of {SURE:g} or more"])
+        print_lines(None, [f"{int(known.sum()) - on} spots on no plot"] if on < known.sum() else [])
+    lost = [f"{tags.triggers.labels[k]}: {tags.sensor.reasons[k]}" for k in np.flatnonzero(~known)]
+    for title, lines in (("WARN", tags.warnings), ("no tag", lost)):
+        print_lines(title, lines if whole else lines[:_FEW])
+        print_lines(title, [f"{len(lines) - _FEW} more: --all lists them"] if len(lines) > _FEW and not whole else [])
+    notes = _notes(tags, field)
+    print_lines("note", notes if whole else [f"{len(notes)} notes and assumptions: --all lists them"])
