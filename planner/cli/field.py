@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from planner.field.scan import Scan
     from planner.planning import Move
 
+_MAPS = (".geojson", ".json", ".gpkg", ".shp", ".csv")
 _SIDE = Range(0.01, 100.0, "m")
 _STD = Range(0.0, 100.0, "m")
 _BESIDE = Range(0.1, 30.0, "m")
@@ -37,7 +38,7 @@ _FEW = 3
 
 @click.command()
 @click.argument("source", metavar="MAP")
-@click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="Write .geojson, .shp or .csv.")
+@click.option("--out", type=OutFile(*_MAPS), metavar="FILE", help="Write .geojson, .gpkg, .shp or .csv.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Draw the map.")
 @click.option("--at", "points", multiple=True, metavar="LAT,LON", help="Which plot a point is on; may be given again.")
 @figure_option("--std", _STD, "M", "Standard deviation of those points.", 0.0)
@@ -56,7 +57,7 @@ def plots(
 ) -> int:
     """Make a plot map from the corners of a trial, or read one; write it, draw it, ask it.
 
-    MAP is a trial's .toml, .geojson, .shp, or a .csv with a column wkt.
+    MAP is a trial's .toml, .geojson, .gpkg, .shp, or a .csv with a column wkt.
 
     \b
     Example:
@@ -107,7 +108,7 @@ def plots(
 @click.option("--profile", type=OneOf(_PROFILES), default="jerk-limited", show_default=True, help="How the moves are timed.")
 @constraint_option
 @click.option("--mission", type=OutFile(".toml"), metavar="FILE.toml", help="The scan as a mission, for boom mission and size.")
-@click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="The plots with their coverage.")
+@click.option("--out", type=OutFile(*_MAPS), metavar="FILE", help="The plots with their coverage.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Plots, coverage and track.")
 @payload_option
 @epsg_option

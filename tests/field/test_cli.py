@@ -100,9 +100,11 @@ def test_plots(boom, day, tmp_path):
     assert (code, error) == (0, "")
     assert "4 plots, 2 rows x 2 ranges, 128.0 m^2" in out
     assert len(out.splitlines()) <= 24
-    assert sorted(path.name for path in tmp_path.glob("plots.*")) == ["plots.dbf", "plots.prj", "plots.shp", "plots.shx"]
-    code, out, _ = boom("plots", "plots.shp", "--json")
-    assert [plot["plot"] for plot in json.loads(out)["plots"]] == ["1-1", "1-2", "2-1", "2-2"]
+    assert {path.suffix for path in tmp_path.glob("plots.*")} == {".cpg", ".dbf", ".prj", ".shp", ".shx"}
+    assert boom("plots", "plots.shp", "--out", "plots.gpkg")[0] == 0
+    for name in ("plots.shp", "plots.gpkg"):
+        code, out, _ = boom("plots", name, "--json")
+        assert [plot["plot"] for plot in json.loads(out)["plots"]] == ["1-1", "1-2", "2-1", "2-2"]
 
 
 def test_a_corner_is_a_quarter_of_the_plot(boom, day, tmp_path):
