@@ -44,7 +44,7 @@ _gap_option = figure_option("--gap", _GAP, "S", "Longest gap to bridge; default:
 @click.argument("triggers", metavar="TRIGGERS.csv")
 @_rig_option
 @click.option("--plots", type=click.Path(), metavar="MAP", help="Plot map: which plot was seen, and how probably.")
-@click.option("--out", type=OutFile(".csv"), metavar="FILE.csv", help="The tags as a table.")
+@click.option("--out", type=OutFile(".csv", ".parquet"), metavar="FILE.csv|.parquet", help="The tags; .parquet is GeoParquet.")
 @click.option("--geojson", type=OutFile(".geojson", ".json"), metavar="FILE.geojson", help="The tags for QGIS.")
 @click.option("--recording", type=OutFile(".rrd"), metavar="FILE.rrd", help="Vehicle, boom and plots in 3D, and a map.")
 @click.option(
@@ -88,7 +88,7 @@ def geotag(
     from planner.field.plot_files import read_plots
     from planner.field.rig import read_rig
     from planner.field.sensor_tags import tag_sensor
-    from planner.field.tag_files import rows_of, write_csv, write_geojson
+    from planner.field.tag_files import rows_of, write_geojson, write_table
 
     files = outputs(out, geojson, recording, inputs=(vehicle, joints, triggers, rig, plots, boom_file))
     boom, placed = load_boom(boom_file, payload), read_rig(rig)
@@ -99,7 +99,7 @@ def geotag(
     rows = rows_of(tags, code, field, located)
     with files:
         if out is not None:
-            write_csv(files.temporary(out), rows)
+            write_table(files.temporary(out), tags, rows)
         if geojson is not None:
             write_geojson(files.temporary(geojson), tags, rows)
         if recording is not None:
