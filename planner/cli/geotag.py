@@ -18,6 +18,7 @@ from planner.cli.options import (
     outputs,
     payload_option,
     plausible,
+    report_option,
     with_names,
 )
 from planner.cli.printing import print_files, print_json, print_lines, print_rows
@@ -50,6 +51,7 @@ _gap_option = figure_option("--gap", _GAP, "S", "Longest gap to bridge; default:
 @click.option(
     "--to-epsg", type=int, callback=plausible(EPSG), metavar="CODE", help="Reference system written; default: the UTM zone."
 )
+@report_option
 @_gap_option
 @epsg_option
 @payload_option
@@ -66,6 +68,7 @@ def geotag(
     geojson: str | None,
     recording: str | None,
     to_epsg: int | None,
+    document: str | None,
     gap: float | None,
     epsg: int | None,
     payload: float | None,
@@ -89,10 +92,12 @@ def geotag(
     from planner.field.rig import read_rig
     from planner.field.sensor_tags import tag_sensor
     from planner.field.tag_files import rows_of, write_geojson, write_table
+    from planner.field.tag_report import all_notes, tag_markdown
 
-    files = outputs(out, geojson, recording, inputs=(vehicle, joints, triggers, rig, plots, boom_file))
+    files = outputs(out, geojson, recording, document=document, inputs=(vehicle, joints, triggers, rig, plots, boom_file))
     boom, placed = load_boom(boom_file, payload), read_rig(rig)
-    tags = tag_sensor(boom, placed, read_vehicle_log(vehicle, epsg, gap), read_joint_log(joints), read_triggers(triggers))
+    log = read_vehicle_log(vehicle, epsg, gap)
+    tags = tag_sensor(boom, placed, log, read_joint_log(joints), read_triggers(triggers))
     field = None if plots is None else map_at(read_plots(plots, None), tags)
     located = None if field is None else locate_spots(field, tags)
     code = zone_of(tags) if to_epsg is None else to_epsg
@@ -106,9 +111,15 @@ def geotag(
             from planner.recording.field import write_field_recording  # slow to import
 
             write_field_recording(files.temporary(recording), boom, placed, tags, field, located)
-    written = with_names({"tags": out, "map": geojson, "recording": recording})
+        if document is not None:
+            from planner.field.tag_pictures import tag_pictures  # matplotlib is slow to import
+            from planner.reports.document import write_document
+
+            pictures = tag_pictures(tags, log, field, located)
+            write_document(files.temporary(document), tag_markdown(tags, placed, field, located), pictures)
+    written = with_names({"tags": out, "map": geojson, "recording": recording, "report": document})
     if as_json:
-        print_json({"tags": rows, "epsg": code, "warnings": tags.warnings, "notes": _notes(tags, field), "files": written})
+        print_json({"tags": rows, "epsg": code, "warnings": tags.warnings, "notes": all_notes(tags, field), "files": written})
         return 0
     _print_tags(tags, field, located, whole)
     print_files(written)
@@ -223,35 +234,15 @@ def _print_figures(found: "Measured", whole: bool) -> None:
     print_lines("note", found.notes if whole else [f"{len(found.notes)} notes and assumptions: --all lists them"])
 
 
-def _notes(tags: "SensorTags", field: "PlotMap | None") -> list[str]:
-    return [*tags.notes, *(() if field is None else field.notes)]
-
-
 def _print_tags(tags: "SensorTags", field: "PlotMap | None", located: "Located | None", whole: bool) -> None:
-    from planner.field.on_plots import SURE
+    from planner.field.tag_report import ACCURACY, accuracy_rows, all_notes, sentences
 
-    n, known = len(tags.triggers.t), tags.known
-    print_lines(None, [f"{tags.triggers.source}: {n} triggers, {known.sum()} tagged"])
-    rows = []
-    for name, each in (("sensor", tags.sensor), ("what it saw", tags.seen)):
-        at = np.isfinite(each.ecef).all(axis=-1)
-        if not at.any():
-            continue
-        std = np.sqrt(np.diagonal(each.covariance[at], axis1=1, axis2=2))
-        long = each.ellipses[at, 0]
-        worst = [f"{figure * 1e3:.0f} mm" for figure in (np.median(long), np.max(long))]
-        rows.append((name, *(f"{np.median(s) * 1e3:.0f} mm" for s in std.T), *worst))
-    print_rows(("", "std east", "north", "up", "95 % ellipse", "worst"), rows)
-    print_lines(None, [f"sag by the gearboxes: {np.nanmedian(-tags.sag[:, 2]) * 1e3:.1f} mm (median), counted in"])
-    if field is not None and located is not None:
-        sure = int((located.probability >= SURE).sum())
-        plots = len(set(located.plot[located.plot >= 0]))
-        on = int((located.plot >= 0).sum())
-        print_lines(None, [f"{on} spots on {plots} of {len(field.names)} plots, {sure} with a probability of {SURE:g} or more"])
-        print_lines(None, [f"{int(known.sum()) - on} spots on no plot"] if on < known.sum() else [])
-    lost = [f"{tags.triggers.labels[k]}: {tags.sensor.reasons[k]}" for k in np.flatnonzero(~known)]
-    for title, lines in (("WARN", tags.warnings), ("no tag", lost)):
+    first, *more = sentences(tags, field, located)
+    print_lines(None, [first])
+    print_rows(ACCURACY, accuracy_rows(tags))
+    print_lines(None, more)
+    for title, lines in (("WARN", tags.warnings), ("no tag", tags.lost)):
         print_lines(title, lines if whole else lines[:_FEW])
         print_lines(title, [f"{len(lines) - _FEW} more: --all lists them"] if len(lines) > _FEW and not whole else [])
-    notes = _notes(tags, field)
+    notes = all_notes(tags, field)
     print_lines("note", notes if whole else [f"{len(notes)} notes and assumptions: --all lists them"])

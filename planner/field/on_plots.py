@@ -18,7 +18,7 @@ class PlotCount:
 
     name: str
     spots: int
-    """Whose likeliest plot it is."""
+    """That are likelier on it than on another plot or on none."""
     sure: int
     """Of them with a probability of SURE or more."""
     least: float
@@ -49,8 +49,8 @@ def locate_spots(plots: PlotMap, tags: SensorTags) -> Located:
 def counts(plots: PlotMap, located: Located) -> list[PlotCount]:
     """Return what was seen of each plot that was seen, in the order of the map."""
     found = []
-    for i in sorted(set(located.plot[located.plot >= 0].tolist())):
-        p = located.probability[located.plot == i]
+    for i in sorted(set(located.plot[located.on].tolist())):
+        p = located.probability[located.on & (located.plot == i)]
         found.append(PlotCount(plots.names[i], len(p), int((p >= SURE).sum()), float(p.min())))
     return found
 

@@ -52,6 +52,11 @@ class SensorTags:
         return self.sensor.known
 
     @property
+    def lost(self) -> tuple[str, ...]:
+        """Triggers without a tag, and why."""
+        return tuple(f"{self.triggers.labels[k]}: {self.sensor.reasons[k]}" for k in np.flatnonzero(~self.known))
+
+    @property
     def bearing(self) -> Array:
         """(n,) direction of the view, clockwise from north [rad]; of little use where that is straight down."""
         return np.asarray(np.arctan2(self.view[:, 0], self.view[:, 1]) % (2.0 * np.pi))
