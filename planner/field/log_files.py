@@ -21,7 +21,7 @@ from planner.field.assumed import (
 from planner.field.earth import datum_note, ecef_from, ecef_of, geodetic_of
 from planner.field.nmea import read_nmea
 from planner.field.tables import TIME_COLUMNS, LogTable, read_table
-from planner.field.vehicle_log import LATITUDE, VehicleLog
+from planner.field.vehicle_log import ANGLE_DEVIATION, DEVIATION, LATITUDE, VehicleLog, require_each
 
 ANGLES = ("latitude", "longitude", "roll", "pitch", "heading")
 _STD = ("std_east_m", "std_north_m", "std_up_m")
@@ -332,7 +332,7 @@ def _attitude(table: LogTable, n: int, ecef: Array) -> tuple[Array, Array, tuple
             usual = HEADING_STD if name == "heading" else TILT_STD
             if table.has(f"std_{name}_deg") or table.has(f"std_{name}_rad"):
                 std[:, i] = _angle(table, f"std_{name}")
-                _not_negative(table, f"std_{name}", std[:, i])
+                require_each(table.path, f"std_{name}", np.degrees(std[:, i]), ANGLE_DEVIATION, table.lines)
             else:
                 std[:, i] = usual
                 assumed.append(f"{name} {np.degrees(usual):g} deg")
@@ -357,7 +357,7 @@ def _position_covariance(table: LogTable) -> tuple[Array, tuple[str, ...]]:
         return covariance_of_quality(quality, table.path, known=table.has("quality"))
     std = np.stack([table.numbers(name) for name in _STD], axis=-1)
     for i, name in enumerate(_STD):
-        _not_negative(table, name, std[:, i])
+        require_each(table.path, name, std[:, i], DEVIATION, table.lines)
     covariance = std[:, :, None] ** 2 * np.eye(3)
     for name, (i, j) in zip(_COVARIANCE, ((0, 1), (0, 2), (1, 2)), strict=True):
         if table.has(name):
@@ -366,9 +366,3 @@ def _position_covariance(table: LogTable) -> tuple[Array, tuple[str, ...]]:
     if negative.any():
         raise InputError(f"{table.where(int(np.argmax(negative)))}: the covariances do not go with the standard deviations")
     return covariance, ()
-
-
-def _not_negative(table: LogTable, name: str, values: Array) -> None:
-    if (values < 0.0).any():
-        k = int(np.argmax(values < 0.0))
-        raise InputError(f"{table.where(k)}: {name} is {values[k]:g}; it must not be negative")

@@ -25,7 +25,7 @@ from planner.field.assumed import (
 from planner.field.earth import ecef_of
 from planner.field.extra import library
 from planner.field.tables import UTC_CLOCK
-from planner.field.vehicle_log import VehicleLog
+from planner.field.vehicle_log import DEVIATION, VehicleLog
 
 _NEAR = 1.0  # [s] between a fix and an attitude that may be used for it
 _LISTED = 3
@@ -119,8 +119,8 @@ def _take(read: _Sentences, sentence: Any, line: int) -> None:
         read.fixes.append((at, float(sentence.lat), float(sentence.lon), height, sentence.quality, line))
     elif kind == "GST":
         east, north, up = float(sentence.stdLong), float(sentence.stdLat), float(sentence.stdAlt)
-        if min(east, north, up) <= 0.0:
-            raise ValueError("a standard deviation that is not positive")
+        if min(east, north, up) <= 0.0 or max(east, north, up) > DEVIATION.high:
+            raise ValueError("a standard deviation that is not plausible")
         read.std[_instant(read, sentence.time)] = (east, north, up)
     elif kind == "ASHR":
         angles = float(sentence.roll), float(sentence.pitch), float(sentence.trueHdg)

@@ -67,6 +67,8 @@ def test_clocks_give_the_same_instants(tmp_path):
         (HEAD, [row(0), row(2), row(1)], "line 4: the time goes back by 1 s; split the log"),
         (HEAD, [row(0), row(1, height=1e5)], "line 3: height is 100000 m"),
         (HEAD, [row(0), row(1, quality=12)], "line 3: quality is 12"),
+        (HEAD.replace("quality", "std_heading_deg"), [row(0), row(1, quality=-1)], "line 3: std_heading is -1 deg"),
+        (HEAD.replace("quality", "std_heading_deg"), [row(0), row(1, quality=1e20)], r"line 3: std_heading is 1e\+20 deg"),
         (HEAD, [row(0, quality=0), row(1, quality=0)], "no row has a fix"),
         (HEAD, [row(0), row(1).replace("2026-07-01T15:00:01Z", "2026-07-01T15:00:01")], "line 3: utc is .*, without a zone"),
         (HEAD, [row(0), row(1).replace("52.13", "fifty")], "line 3: latitude_deg is .*; it must be a number"),
