@@ -21,7 +21,7 @@ from planner.field.assumed import (
 from planner.field.earth import datum_note, ecef_from, ecef_of, geodetic_of
 from planner.field.nmea import read_nmea
 from planner.field.tables import TIME_COLUMNS, LogTable, read_table
-from planner.field.vehicle_log import ANGLE_DEVIATION, DEVIATION, LATITUDE, VehicleLog, require_each
+from planner.field.vehicle_log import ANGLE_DEVIATION, DEVIATION, LATITUDE, VehicleLog, listed, require_each
 
 ANGLES = ("latitude", "longitude", "roll", "pitch", "heading")
 _STD = ("std_east_m", "std_north_m", "std_up_m")
@@ -114,7 +114,8 @@ def read_vehicle_log(path: str | Path, epsg: int | None = None, longest_gap: flo
         clock=clock,
         source=str(path),
         longest_gap=longest_gap,
-        notes=(*notes, *lost, *doubled, *placed, *turned, *assumed),
+        lost=lost,
+        notes=(*notes, *doubled, *placed, *turned, *assumed),
     )
 
 
@@ -177,7 +178,8 @@ def read_points(path: str | Path, epsg: int | None = None) -> Points:
     latitude, longitude, height, placed = _position(table, epsg)
     covariance, assumed = _position_covariance(table)
     ecef, std = ecef_of(latitude, longitude, height), _mean_std(covariance)
-    return Points(read_only(t), read_only(ecef), read_only(std), clock, str(path), (*notes, *lost, *doubled, *placed, *assumed))
+    left = (f"{path}: {listed('without a fix left out', lost)}",) if lost else ()
+    return Points(read_only(t), read_only(ecef), read_only(std), clock, str(path), (*notes, *left, *doubled, *placed, *assumed))
 
 
 def _mean_std(covariance: Array) -> Array:
@@ -212,8 +214,8 @@ def _is_nmea(path: str | Path) -> bool:
     return start[:1] in (b"$", b"!")
 
 
-def _with_fix(table: LogTable) -> tuple[LogTable, tuple[str, ...]]:
-    """Leave out the rows of quality 0, which may be blank."""
+def _with_fix(table: LogTable) -> tuple[LogTable, tuple[int, ...]]:
+    """Leave out the rows of quality 0, which may be blank; return their lines, too."""
     if not table.has("quality"):
         return table, ()
     quality = table.numbers("quality")
@@ -226,8 +228,7 @@ def _with_fix(table: LogTable) -> tuple[LogTable, tuple[str, ...]]:
         return table, ()
     if len(lost) == len(quality):
         raise InputError(f"{table.path}: no row has a fix (quality is 0 throughout)")
-    note = f"{table.path}: {len(lost)} rows without a fix (quality 0) left out, the first at line {table.lines[lost[0]]}"
-    return table.keep(np.flatnonzero(quality != 0)), (note,)
+    return table.keep(np.flatnonzero(quality != 0)), tuple(table.lines[lost].tolist())
 
 
 def _without_doubles(table: LogTable, t: Array) -> tuple[LogTable, Array, tuple[str, ...]]:

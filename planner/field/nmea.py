@@ -25,10 +25,9 @@ from planner.field.assumed import (
 from planner.field.earth import ecef_of
 from planner.field.extra import library
 from planner.field.tables import UTC_CLOCK
-from planner.field.vehicle_log import DEVIATION, VehicleLog
+from planner.field.vehicle_log import DEVIATION, VehicleLog, listed
 
 _NEAR = 1.0  # [s] between a fix and an attitude that may be used for it
-_LISTED = 3
 _HALF_DAY = timedelta(hours=12)
 
 
@@ -146,9 +145,8 @@ def _log(path: str, read: _Sentences, longest_gap: float | None) -> VehicleLog:
     values = np.array([fix[1:5] for fix in read.fixes])
     latitude, longitude, height = np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]
     quality, lines = values[:, 3].astype(int), np.array([fix[5] for fix in read.fixes])
-    notes = [_listed(path, what, found) for what, found in (
-        ("sentences that are broken or have a wrong checksum", read.broken), ("GGA without a fix", read.lost),
-    ) if found]  # fmt: skip
+    broken = "broken or with a wrong checksum, left out"
+    notes = [f"{path}: {listed(broken, read.broken)}"] if read.broken else []
     std = np.array([read.std.get(fix[0], (np.nan,) * 3) for fix in read.fixes])
     if np.isfinite(std).all():
         covariance = std[:, :, None] ** 2 * np.eye(3)
@@ -176,6 +174,7 @@ def _log(path: str, read: _Sentences, longest_gap: float | None) -> VehicleLog:
         clock=UTC_CLOCK,
         source=path,
         longest_gap=longest_gap,
+        lost=tuple(read.lost),
         notes=tuple(notes),
     )
 
@@ -211,8 +210,3 @@ def _at_fixes(path: str, t: Array, at: Array, angles: Array) -> Array:
         k = int(np.argmax(away > _NEAR))
         raise InputError(f"{path}: the fix at {datetime.fromtimestamp(t[k], UTC):%H:%M:%S} has no attitude within {_NEAR:g} s")
     return np.stack([np.interp(t, at, column) for column in angles.T], axis=-1)
-
-
-def _listed(path: str, what: str, lines: list[int]) -> str:
-    first = ", ".join(map(str, lines[:_LISTED])) + (", ..." if len(lines) > _LISTED else "")
-    return f"{path}: {len(lines)} {what} left out, line{'s' if len(lines) > 1 else ''} {first}"

@@ -109,7 +109,7 @@ def test_rows_without_a_fix_and_repeated_ones_are_noted(tmp_path):
     rows = [row(0), row(1), row(1), row(2).rsplit(",", 1)[0] + ",0", *(row(k) for k in range(3, 9))]
     log = read_vehicle_log(written(tmp_path, HEAD, *rows))
     assert len(log.t) == 8
-    assert any("1 rows without a fix (quality 0) left out, the first at line 5" in note for note in log.notes)
+    assert log.warnings == (f"{tmp_path / 'log.csv'}: 1 line without a fix left out: 5",)
     assert any("1 rows that repeat the one above" in note for note in log.notes)
 
 
@@ -180,7 +180,7 @@ def test_nmea_over_midnight(tmp_path):
     assert np.linalg.norm(log.ecef - drive.point(kept, ANTENNA), axis=-1).max() < 2e-4
     assert log.angles == pytest.approx(drive.angles(kept), abs=2e-7)
     assert np.sqrt(np.diagonal(log.position_covariance[5])) == pytest.approx([0.012, 0.011, 0.021])
-    assert any("1 sentences that are broken or have a wrong checksum left out, line 10" in note for note in log.notes)
+    assert any("1 line broken or with a wrong checksum, left out: 10" in note for note in log.notes)
     (tmp_path / "log.nmea").write_text("\n".join(line for line in nmea(t, drive, heading=False)))
     assert any("side slip" in note for note in read_vehicle_log(place).notes)
 
