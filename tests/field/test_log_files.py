@@ -185,6 +185,19 @@ def test_nmea_over_midnight(tmp_path):
     assert any("side slip" in note for note in read_vehicle_log(place).notes)
 
 
+def test_nmea_attitude_turns_on_the_sphere_between_its_sentences(tmp_path):
+    """Attitude at every fourth fix alone, over north: halfway in angle, never by way of 180 deg."""
+    drive, t = Drive(begin=-0.05, turning=0.02, sway=0.001), np.arange(0.0, 6.0, 0.25)
+    lines = [line for k, line in enumerate(nmea(t, drive)) if "PASHR" not in line or k // 4 % 4 == 0]
+    place = tmp_path / "log.nmea"
+    place.write_text("\r\n".join(lines))
+    log = read_vehicle_log(place)
+    inside = log.t - log.t[0] <= 5.0
+    off = (log.angles - drive.angles(t) + np.pi) % (2.0 * np.pi) - np.pi
+    assert np.abs(off[inside]).max() < 0.001 * 1.9**2 / 8.0 * 1.1  # of a line under a sine, over one second
+    assert any("a fix is 0.75 s from the nearest attitude" in note for note in log.notes)
+
+
 def test_nmea_without_a_date_is_refused(tmp_path):
     place = tmp_path / "log.nmea"
     place.write_text("\n".join(line for line in nmea(np.arange(3.0), Drive()) if "RMC" not in line))
