@@ -140,6 +140,29 @@ def _antenna(log, t):
     return (1.0 - u) * log.ecef[k] + u * log.ecef[k + 1]
 
 
+def test_simulated_field_errs_as_predicted(tmp_path):
+    """A minute at 1.4 m/s with 20 Hz RTK and 100 Hz joints as files; tagged at the fixes, the RMS is what the tags say."""
+    boom, drive = without_drives(Boom.load()), Drive()
+    names = write_field(tmp_path, drive, 60.0, seed=21)
+    quiet = replace(
+        read_rig(names["rig"]),
+        antenna_std=0.0,
+        imu_std=0.0,
+        mount_std=0.0,
+        mount_turn_std=0.0,
+        joint_std=np.zeros(5),
+        sensor_std=0.0,
+    )
+    t = np.arange(20, 1180) * 0.05
+    triggers = Triggers(t + 0.02 + 1.7830e9, tuple(map(str, t)), "utc", "triggers")
+    found = tag_sensor(boom, quiet, read_vehicle_log(names["vehicle"]), read_joint_log(names["joints"]), triggers).sensor
+    true, _ = true_spots(boom, drive, t + 0.02, joint_position(t))
+    rms = np.sqrt(((FRAME.enu(found.ecef) - true) ** 2).mean(axis=0))
+    predicted = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2).mean(axis=0))
+    assert rms == pytest.approx(predicted, rel=0.07)  # 2 % is the noise of an RMS of 1,160
+    assert predicted == pytest.approx([0.0149, 0.0149, 0.0204], rel=0.05)  # 14, 14, 20 mm, and the attitude over 3 m
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_whole_chains_covariance_equals_monte_carlo(seed, day):
     """A random rig, pose and motion: every error of logs, rig and clocks drawn 100,000 times, the chain written out again."""
