@@ -169,15 +169,16 @@ def rig(
 ) -> int:
     """Measure the rig: how late the logs are, lever arm and mounting angles, from a manoeuvre.
 
-    The vehicle turned and changed its speed while POINTS, a total station's or a second receiver's positions of one
-    point, were measured. POINTS has a time and a position, as VEHICLE, or is NMEA.
+    The vehicle turned and changed its speed while a total station or a second receiver measured one point. POINTS has a
+    time and a position in any form of VEHICLE.
 
     \b
     delay         how late VEHICLE's stamps are, POINTS' taken as true
     points-delay  how late POINTS' stamps are, VEHICLE's taken as true
     joints-delay  how late JOINTS' stamps are
-    lever-arm     from the antenna to the mount; for a point X,Y,Z of the vehicle, the antenna's place
+    lever-arm     from the antenna to the mount; with X,Y,Z, the antenna's place
     angles        of the mount on the vehicle
+
     \b
     Example:
       boom rig vehicle.csv points.csv --rig rig.toml --estimate delay,lever-arm --out measured.toml

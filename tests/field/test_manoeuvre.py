@@ -54,6 +54,15 @@ def test_delay_and_lever_arm_are_found_and_written(manoeuvre, tmp_path):
     assert table["joints"] == tomllib.loads((tmp_path / "rig.toml").read_text())["joints"]
 
 
+def test_answers_fit_every_width(manoeuvre, monkeypatch):
+    for width in (60, 80, 140):
+        monkeypatch.setenv("COLUMNS", str(width))
+        for asked in (ASK, ("geotag", "vehicle.csv", "joints.csv", "triggers.csv", "--rig", "rig.toml")):
+            lines = manoeuvre(*asked)[1].splitlines()
+            assert max(map(len, lines)) <= width
+            assert "…" not in "".join(lines)
+
+
 def test_geotag_reads_the_measured_rig(manoeuvre, tmp_path):
     """The same triggers, tagged with the rig as given and as measured, against where the sensor was."""
     manoeuvre(*ASK, "--out", "measured.toml")
