@@ -43,8 +43,8 @@ PAGES = {
             "boom catalogue",
         ),
     ),
-    "answers-field": (
-        "Answers from the field",
+    "answers-geotags": (
+        "Answers about geotags",
         (
             "boom plots demos/field/trial.toml --at 52.130029,-106.619911 --std 0.05",
             "boom rig demos/field/manoeuvre.csv demos/field/prism.csv --rig demos/field/rig.toml --out measured.toml",

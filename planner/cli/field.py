@@ -18,6 +18,7 @@ from planner.cli.options import (
     load_boom,
     outputs,
     payload_option,
+    plausible,
 )
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows, tracked
 
@@ -99,16 +100,48 @@ def plots(
 @click.command()
 @click.argument("source", metavar="MAP")
 @click.option("--footprint", required=True, metavar="M,M", help="What the sensor sees: along the arm, across it.")
-@figure_option("--rate", RATE, "HZ", "Of the sensor.", 4.0)
-@figure_option("--tip-height", OFFSET, "M", "Of the tip over the mount: canopy and distance, less the mount's height.", 0.9)
-@figure_option("--offset", _BESIDE, "M", "From the track to the middle of a row; default: where the fewest stops do.")
-@figure_option("--overlap", _SHARE, "SHARE", "Of two lines beside each other.", 0.1)
-@figure_option("--speed", _PACE, "M/S", "Drive past the plots; default: stop.")
-@figure_option("--drive-speed", _PACE, "M/S", "From stop to stop.", 1.0)
+@click.option(
+    "--rate", type=float, default=4.0, show_default=True, callback=plausible(RATE), metavar="HZ", help="Of the sensor."
+)
+@click.option(
+    "--tip-height",
+    type=float,
+    default=0.9,
+    show_default=True,
+    callback=plausible(OFFSET),
+    metavar="M",
+    help="Of the tip over the mount: canopy and distance, less the mount's height.",
+)
+@click.option(
+    "--offset",
+    type=float,
+    callback=plausible(_BESIDE),
+    metavar="M",
+    help="From the track to the middle of a row; default: where the fewest stops do.",
+)
+@click.option(
+    "--overlap",
+    type=float,
+    default=0.1,
+    show_default=True,
+    callback=plausible(_SHARE),
+    metavar="SHARE",
+    help="Of two lines beside each other.",
+)
+@click.option("--speed", type=float, callback=plausible(_PACE), metavar="M/S", help="Drive past the plots; default: stop.")
+@click.option(
+    "--drive-speed",
+    type=float,
+    default=1.0,
+    show_default=True,
+    callback=plausible(_PACE),
+    metavar="M/S",
+    help="From stop to stop.",
+)
 @click.option("--profile", type=OneOf(_PROFILES), default="jerk-limited", show_default=True, help="How the moves are timed.")
 @constraint_option
 @click.option("--mission", type=OutFile(".toml"), metavar="FILE.toml", help="The scan as a mission, for boom mission and size.")
-@click.option("--out", type=OutFile(*_MAPS), metavar="FILE", help="The plots with their coverage.")
+@click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="The plots with their coverage.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Plots, coverage and track.")
 @payload_option
 @epsg_option

@@ -36,22 +36,6 @@ def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any]
     return within
 
 
-def figure_option(
-    name: str, quantity: Range, metavar: str, help: str, default: float | None = None
-) -> Callable[[_Command], _Command]:
-    """Return an option that takes a number within the range of a quantity, and shows its default if it has one.
-
-    Args:
-        name: with its dashes.
-        quantity: what the number must be.
-        metavar: its unit.
-        help: what it is.
-        default: None is none.
-    """
-    within, shown = plausible(quantity), default is not None
-    return click.option(name, type=float, default=default, show_default=shown, callback=within, metavar=metavar, help=help)
-
-
 _WORDS = {field.name: field for field in fields(MoveWords) if "word" in field.metadata}
 _COMPLETE = {"via": targets, "constraint": constraints, "vehicle": vehicles}
 
@@ -125,6 +109,22 @@ def boom_option(command: _Command) -> _Command:
     `load_boom` reads --catalogue from the context, because a boom may name drives of that file.
     """
     return _boom_option(_catalogue_option(command))
+
+
+def figure_option(
+    name: str, quantity: Range, metavar: str, help: str, default: float | None = None
+) -> Callable[[_Command], _Command]:
+    """Return an option that takes a number within the range of a quantity, and shows its default if it has one.
+
+    Args:
+        name: with its dashes.
+        quantity: what the number must be.
+        metavar: its unit.
+        help: what it is.
+        default: None is none.
+    """
+    within, shown = plausible(quantity), default is not None
+    return click.option(name, type=float, default=default, show_default=shown, callback=within, metavar=metavar, help=help)
 
 
 payload_option = click.option("--payload", type=float, metavar="KG", help="Payload mass; default: that of the boom file.")
