@@ -6,6 +6,7 @@ differs in more than digits, or an answer is longer than LONGEST lines.
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -42,6 +43,15 @@ PAGES = {
             "boom catalogue",
         ),
     ),
+    "answers-geotags": (
+        "Answers about geotags",
+        (
+            "boom plots demos/field/trial.toml --at 52.130029,-106.619911 --std 0.05",
+            "boom rig demos/field/manoeuvre.csv demos/field/prism.csv --rig demos/field/rig.toml --out measured.toml",
+            "boom geotag demos/field/vehicle.csv demos/field/joints.csv demos/field/triggers.csv --rig demos/field/rig.toml "
+            "--plots demos/field/trial.toml",
+        ),
+    ),
     "answers-files": (
         "Answers about booms and files",
         (
@@ -61,6 +71,7 @@ def main() -> int:
     """Write or check every page; return 1 if one is not as it should be."""
     check, wrong = "--check" in sys.argv[1:], []
     with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(GUIDE.parent / "field", Path(folder) / "demos" / "field")
         for name, (title, commands) in PAGES.items():
             parts = [f"# {title}\n", INTRODUCTION]
             for command in commands:

@@ -1,4 +1,4 @@
-"""In the field: geotags of a sensor's measurements, plot maps, row scans."""
+"""In the field: plot maps and row scans."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,8 @@ from planner.cli.options import (
     all_option,
     boom_option,
     constraint_option,
+    epsg_option,
+    figure_option,
     json_option,
     load_boom,
     outputs,
@@ -21,114 +23,27 @@ from planner.cli.options import (
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows, tracked
 
 if TYPE_CHECKING:
-    from planner.field.plots import Located, PlotMap
+    from planner.field.plots import PlotMap
     from planner.field.scan import Scan
-    from planner.field.sensor_tags import SensorTags
     from planner.planning import Move
 
-_EPSG = Range(1024, 999_999, "")
-_GAP = Range(1e-3, 1e4, "s")
+_MAPS = (".geojson", ".json", ".gpkg", ".shp", ".csv")
 _SIDE = Range(0.01, 100.0, "m")
+_STD = Range(0.0, 100.0, "m")
 _BESIDE = Range(0.1, 30.0, "m")
 _SHARE = Range(0.0, 0.9, "")
 _PACE = Range(0.01, 10.0, "m/s")
 _PROFILES = ("cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal")
-_SURE = 0.95
 _FEW = 3
-
-_epsg_option = click.option(
-    "--epsg", type=int, callback=plausible(_EPSG), metavar="CODE", help="Reference system of eastings and northings read."
-)
-
-
-@click.command()
-@click.argument("vehicle", metavar="VEHICLE")
-@click.argument("joints", metavar="JOINTS.csv")
-@click.argument("triggers", metavar="TRIGGERS.csv")
-@click.option("--rig", required=True, type=click.Path(), metavar="RIG.toml", help="What stands where on the vehicle.")
-@click.option("--plots", type=click.Path(), metavar="MAP", help="Plot map: which plot was seen, and how probably.")
-@click.option("--out", type=OutFile(".csv"), metavar="FILE.csv", help="The tags as a table.")
-@click.option("--geojson", type=OutFile(".geojson", ".json"), metavar="FILE.geojson", help="The tags for QGIS.")
-@click.option("--recording", type=OutFile(".rrd"), metavar="FILE.rrd", help="Vehicle, boom and plots in 3D, and a map.")
-@click.option(
-    "--to-epsg", type=int, callback=plausible(_EPSG), metavar="CODE", help="Reference system written; default: the UTM zone."
-)
-@click.option("--gap", type=float, callback=plausible(_GAP), metavar="S", help="Longest gap to bridge; default: 3 intervals.")
-@_epsg_option
-@payload_option
-@boom_option
-@all_option
-@json_option
-def geotag(
-    vehicle: str,
-    joints: str,
-    triggers: str,
-    rig: str,
-    plots: str | None,
-    out: str | None,
-    geojson: str | None,
-    recording: str | None,
-    to_epsg: int | None,
-    gap: float | None,
-    epsg: int | None,
-    payload: float | None,
-    boom_file: str | None,
-    whole: bool,
-    as_json: bool,
-) -> int:
-    """Say where the sensor at the boom's end was at every trigger, what it saw, and how sure that is.
-
-    VEHICLE is CSV or NMEA: time, position, attitude and their deviations. JOINTS has a time and q1..q5.
-    A time is `utc`, `gps_s`, or `t` of one clock for all. Angles: heading clockwise from true north,
-    pitch nose up, roll right side down.
-
-    \b
-    Example:
-      boom geotag vehicle.csv joints.csv triggers.csv --rig rig.toml --plots trial.toml --out tags.csv
-    """
-    from planner.field.log_files import read_joint_log, read_triggers, read_vehicle_log
-    from planner.field.plot_files import read_plots
-    from planner.field.rig import read_rig
-    from planner.field.sensor_tags import tag_sensor
-    from planner.field.tag_files import rows_of, write_csv, write_geojson
-
-    files = outputs(out, geojson, recording, inputs=(vehicle, joints, triggers, rig, plots, boom_file))
-    boom = load_boom(boom_file, payload)
-    log = read_vehicle_log(vehicle, epsg, gap)
-    placed = read_rig(rig)
-    tags = tag_sensor(boom, placed, log, read_joint_log(joints), read_triggers(triggers))
-    field = None if plots is None else _map_at(read_plots(plots, None), tags)
-    located = None if field is None else _located(field, tags)
-    code = _zone(tags) if to_epsg is None else to_epsg
-    rows = rows_of(tags, code, field, located)
-    with files:
-        if out is not None:
-            write_csv(files.temporary(out), rows)
-        if geojson is not None:
-            write_geojson(files.temporary(geojson), tags, rows)
-        if recording is not None:
-            from planner.recording.field import write_field_recording  # slow to import
-
-            write_field_recording(files.temporary(recording), boom, placed, tags, field, located)
-    names = (("tags", out), ("map", geojson), ("recording", recording))
-    written = {kind: name for kind, name in names if name is not None}
-    if as_json:
-        print_json({"tags": rows, "epsg": code, "warnings": tags.warnings, "notes": _notes(tags, field), "files": written})
-        return 0
-    _print_tags(tags, field, located, whole)
-    print_files(written)
-    print_lines("next", [] if out else [f"boom geotag {vehicle} {joints} {triggers} --rig {rig} --out tags.csv"])
-    return 0
 
 
 @click.command()
 @click.argument("source", metavar="MAP")
-@click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="Write .geojson, .shp or .csv.")
+@click.option("--out", type=OutFile(*_MAPS), metavar="FILE", help="Write .geojson, .gpkg, .shp or .csv.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Draw the map.")
 @click.option("--at", "points", multiple=True, metavar="LAT,LON", help="Which plot a point is on; may be given again.")
-@click.option("--std", type=float, default=0.0, callback=plausible(Range(0.0, 100.0, "m")), metavar="M",
-              help="Standard deviation of those points.")  # fmt: skip
-@_epsg_option
+@figure_option("--std", _STD, "M", "Standard deviation of those points.", 0.0)
+@epsg_option
 @all_option
 @json_option
 def plots(
@@ -143,7 +58,7 @@ def plots(
 ) -> int:
     """Make a plot map from the corners of a trial, or read one; write it, draw it, ask it.
 
-    MAP is a trial's .toml, .geojson, .shp, or a .csv with a column wkt.
+    MAP is a trial's .toml, .geojson, .gpkg, .shp, or a .csv with a column wkt.
 
     \b
     Example:
@@ -229,7 +144,7 @@ def plots(
 @click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="The plots with their coverage.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Plots, coverage and track.")
 @payload_option
-@_epsg_option
+@epsg_option
 @boom_option
 @all_option
 @json_option
@@ -343,68 +258,6 @@ def _scan_json(found: "Scan", columns: dict[str, list[Any]], written: dict[str, 
         for name, move in found.moves.items()
     ]
     return {"offset_m": found.offset, "stops": len(found.track), "plots": plots, "moves": moves, "files": written}
-
-
-def _map_at(field: "PlotMap", tags: "SensorTags") -> "PlotMap":
-    """Return the map with its ground at the height of what was seen, checked to be where the log is."""
-    from planner.field.plots import require_near
-
-    latitude, longitude, height = tags.seen.geodetic
-    require_near(field, *tags.sensor.geodetic[:2], tags.triggers.source)
-    known = np.isfinite(latitude) & np.isfinite(longitude)
-    return field.at_height(float(np.median(height[known]))) if known.any() else field
-
-
-def _located(field: "PlotMap", tags: "SensorTags") -> "Located":
-    from planner.field.plots import locate
-
-    spots = np.full((len(tags.triggers.t), 2), np.nan)
-    known = np.isfinite(tags.seen.ecef).all(axis=-1)
-    if known.any():
-        spots[known] = field.plane_of(tags.seen.ecef[known])
-    return locate(field, spots, tags.seen.covariance[:, :2, :2])
-
-
-def _zone(tags: "SensorTags") -> int:
-    from planner.field.earth import utm_zone
-
-    latitude, longitude, _ = tags.sensor.geodetic
-    first = int(np.argmax(tags.known))
-    return utm_zone(float(latitude[first]), float(longitude[first]))
-
-
-def _notes(tags: "SensorTags", field: "PlotMap | None") -> list[str]:
-    return [*tags.notes, *(() if field is None else field.notes)]
-
-
-def _print_tags(tags: "SensorTags", field: "PlotMap | None", located: "Located | None", whole: bool) -> None:
-    n, known = len(tags.triggers.t), tags.known
-    print_lines(None, [f"{tags.triggers.source}: {n} triggers, {known.sum()} tagged"])
-    rows = []
-    for name, each in (("sensor", tags.sensor), ("what it saw", tags.seen)):
-        at = np.isfinite(each.ecef).all(axis=-1)
-        if not at.any():
-            continue
-        std = np.sqrt(np.diagonal(each.covariance[at], axis1=1, axis2=2))
-        long = each.ellipses[at, 0]
-        worst = [f"{figure * 1e3:.0f} mm" for figure in (np.median(long), np.max(long))]
-        rows.append((name, *(f"{np.median(s) * 1e3:.0f} mm" for s in std.T), *worst))
-    print_rows(("", "std east", "north", "up", "95 % ellipse", "worst"), rows)
-    print_lines(None, [f"sag by the gearboxes: {np.nanmedian(-tags.sag[:, 2]) * 1e3:.1f} mm (median), counted in"])
-    if field is not None and located is not None:
-        sure = int((located.probability >= _SURE).sum())
-        plots = len(set(located.plot[located.plot >= 0]))
-        on = int((located.plot >= 0).sum())
-        print_lines(
-            None, [f"{on} spots on {plots} of {len(field.names)} plots, {sure} with a probability of {_SURE:g} or more"]
-        )
-        print_lines(None, [f"{int(known.sum()) - on} spots on no plot"] if on < known.sum() else [])
-    lost = [f"{tags.triggers.labels[k]}: {tags.sensor.reasons[k]}" for k in np.flatnonzero(~known)]
-    for title, lines in (("WARN", tags.warnings), ("no tag", lost)):
-        print_lines(title, lines if whole else lines[:_FEW])
-        print_lines(title, [f"{len(lines) - _FEW} more: --all lists them"] if len(lines) > _FEW and not whole else [])
-    notes = _notes(tags, field)
-    print_lines("note", notes if whole else [f"{len(notes)} notes and assumptions: --all lists them"])
 
 
 def _print_map(field: "PlotMap", whole: bool) -> None:

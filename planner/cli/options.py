@@ -133,11 +133,31 @@ def boom_option(command: _Command) -> _Command:
     return _boom_option(_catalogue_option(command))
 
 
+def figure_option(
+    name: str, quantity: Range, metavar: str, help: str, default: float | None = None
+) -> Callable[[_Command], _Command]:
+    """Return an option that takes a number within the range of a quantity, and shows its default if it has one.
+
+    Args:
+        name: with its dashes.
+        quantity: what the number must be.
+        metavar: its unit.
+        help: what it is.
+        default: None is none.
+    """
+    within, shown = plausible(quantity), default is not None
+    return click.option(name, type=float, default=default, show_default=shown, callback=within, metavar=metavar, help=help)
+
+
 payload_option = click.option("--payload", type=float, metavar="KG", help="Payload mass; default: that of the boom file.")
 payload_as_option = click.option(
     "--payload-as", type=OneOf(["mass", "force"]), metavar="mass|force", default="mass", show_default=True,
     help="mass: the payload moves with the tip. force: only its weight acts there, as in the thesis.",
 )  # fmt: skip
+EPSG = Range(1024, 999_999, "")
+epsg_option = click.option(
+    "--epsg", type=int, callback=plausible(EPSG), metavar="CODE", help="Reference system of eastings and northings read."
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output, in SI.")
 all_option = click.option("--all", "whole", is_flag=True, help="Print every row, assumption and note.")
 report_option = click.option(

@@ -13,6 +13,7 @@ import numpy as np
 
 from boom_model import JOINTS, BaseMotion, Boom, forward_kinematics, inverse_dynamics, jacobian, wind_up
 from boom_model.arrays import Array
+from planner.field.earth import axes, geodetic_of
 from planner.field.geotag import LeverArm
 from planner.field.rig import Rig
 
@@ -36,6 +37,13 @@ def yielding(boom: Boom, q: Array, up: Array) -> Array:
     return found
 
 
+def up_in_mount(rig: Rig, ecef: Array, R_ecef_body: Array) -> Array:
+    """Return the unit vectors (n, 3) against gravity along frame 1, where the vehicle is at ecef (n, 3) [m]."""
+    latitude, longitude, _ = geodetic_of(ecef)
+    up: Array = np.einsum("nij,ni->nj", R_ecef_body, axes(latitude, longitude)[..., 2]) @ rig.R_body_mount
+    return up
+
+
 def play(boom: Boom) -> tuple[Array, tuple[str, ...]]:
     """Return the standard deviation (5,) [rad, m] of each joint by its drive, and what is not known of it."""
     variance, unknown = np.zeros(5), []
@@ -52,6 +60,19 @@ def play(boom: Boom) -> tuple[Array, tuple[str, ...]]:
         for width in (gearbox.backlash, gearbox.hysteresis, step):
             variance[i] += ((width or 0.0) * _UNEVEN) ** 2
     return np.sqrt(variance), tuple(unknown)
+
+
+def in_mount(boom: Boom, q: Array, point: Array) -> Array:
+    """Return where a point of the tip's frame is in frame 1, (n, 3) [m].
+
+    Args:
+        boom: the boom.
+        q: (n, 5) joint positions, wind-up taken off [rad, m].
+        point: (3,) or (n, 3) in frame 11 [m].
+    """
+    tip = forward_kinematics(boom, q)
+    place: Array = tip.position + np.einsum("nij,nj->ni", tip.rotation, np.broadcast_to(point, (len(q), 3)))
+    return place
 
 
 def lever_arm(boom: Boom, rig: Rig, q: Array, qd: Array, point: Array) -> LeverArm:

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from boom_model import InputError
 from boom_model.arrays import Array, checked
 
+NAMES = ("roll", "pitch", "heading")
 _NED_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])  # its own inverse
 _FRD_FLU = np.diag([1.0, -1.0, -1.0])
 

@@ -2,11 +2,12 @@
 
 A point of the vehicle was measured from outside, or by a second receiver, at time stamps t_k:
 
-    z_k = p_antenna(t_k - d) + R_enu_body(t_k - d) (r + R(a) m_k(t_k - d)) + noise
+    z_k = p_antenna(t + v) + R_enu_body(t + v) (r + R(a) m(t + j)) + noise,   t = t_k - d
 
-d is how late the stamps are, r the lever arm from the antenna (to the mount, where the point
-moves on a mount), a the mounting angles, and m the point in the mount. What the manoeuvre does not
-tell apart is refused: a straight drive does not tell the lever arm along it from the time.
+d is how late the stamps of the points are, v those of the vehicle's log, j those of the joints'
+log, r the lever arm from the antenna (to the mount, where the point moves on a mount), a the
+mounting angles, and m the point in the mount. What the manoeuvre does not tell apart is refused: a
+straight drive does not tell the lever arm along it from the time.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,11 +25,14 @@ from planner.field.geotag import Latencies, state_at
 from planner.field.vehicle_log import VehicleLog
 
 OFFSET = ("offset_s",)
+VEHICLE = ("vehicle_latency_s",)
+JOINTS = ("joints_latency_s",)
 LEVER = ("lever_x_m", "lever_y_m", "lever_z_m")
 ANGLES = ("angle_x_rad", "angle_y_rad", "angle_z_rad")
-_STEPS = dict.fromkeys(OFFSET, 0.25) | dict.fromkeys(LEVER, 0.05) | dict.fromkeys(ANGLES, 0.01)
+_TIMES = (*OFFSET, *VEHICLE, *JOINTS)
+_STEPS = dict.fromkeys(_TIMES, 0.25) | dict.fromkeys(LEVER, 0.05) | dict.fromkeys(ANGLES, 0.01)
 """Of the differences that give the slopes."""
-_WORST = {"offset_s": 0.03, "lever": 0.5, "angle": 0.2}
+_WORST = dict.fromkeys(_TIMES, 0.03) | {"lever": 0.5, "angle": 0.2}
 """Standard deviations from which a manoeuvre tells nothing of a parameter."""
 _MOST_OFFSET = 2.0  # [s]
 _SMOOTH = 1.0  # [s]
@@ -43,8 +47,8 @@ class Estimate:
 
     names: tuple[str, ...]
     values: Array
-    """(k,) of each parameter, with its unit in its name; lever arms are whole, angles are added to
-    the rig's"""
+    """(k,) of each parameter, with its unit in its name; lever arms are whole, times and angles are
+    added to the rig's"""
     covariance: Array
     """(k, k)"""
     rms: float
@@ -70,7 +74,7 @@ def estimate(
     log: VehicleLog,
     times: ArrayLike,
     observed: ArrayLike,
-    std: float,
+    std: ArrayLike,
     lever: ArrayLike,
     free: Sequence[str] = (*OFFSET, *LEVER),
     *,
@@ -84,24 +88,35 @@ def estimate(
         log: the vehicle's log.
         times: (n,) time stamps of the measured positions [s].
         observed: (n, 3) positions of the point in ECEF [m].
-        std: standard deviation of each coordinate [m]; the log's own is added.
+        std: standard deviation of each coordinate, one number or (n,) [m]; the log's own is added.
         lever: (3,) first guess of the lever arm from the antenna [m].
-        free: parameters to estimate, of OFFSET, LEVER and ANGLES.
-        in_mount: the point in the mount (m, 3) [m] at true times (m,); None is its origin.
+        free: parameters to estimate, of OFFSET, VEHICLE, JOINTS, LEVER and ANGLES.
+        in_mount: the point in the mount (m, 3) [m] at times (m,), which JOINTS moves; NaN where it
+            is not known. None is the mount's origin.
         R_body_mount: (3, 3) mounting as the rig gives it; None is the vehicle's axes.
         latencies: of the log, taken off.
 
     Raises:
-        InputError: too few points lie within the log, or the manoeuvre does not tell a parameter.
+        InputError: too few points lie within the log, a time is off by more than 2 s, or the
+            manoeuvre does not tell a parameter.
     """
     stamps, seen, start = checked("times", times), checked("observed", observed, 3), checked("lever", lever, 3)
-    if in_mount is None and set(free) & set(ANGLES):
-        raise InputError("mounting angles need a point that moves in the mount; a fixed one gives its lever arm alone")
+    if in_mount is None and set(free) & {*ANGLES, *JOINTS}:
+        raise InputError(
+            "mounting angles need a point that moves in the mount, and so does the joints' latency; "
+            "a fixed one gives its lever arm alone"
+        )
+    if {*OFFSET, *VEHICLE} <= set(free):
+        raise InputError("one manoeuvre does not tell the latency of the vehicle's log from that of the measured points")
     late = Latencies() if latencies is None else latencies
     inside = (stamps - _MOST_OFFSET > log.t[0]) & (stamps + _MOST_OFFSET < log.t[-1])
-    stamps, seen = stamps[inside], seen[inside]
-    known = state_at(log, stamps, late).known if len(stamps) else np.zeros(0, dtype=bool)
-    stamps, seen = stamps[known], seen[known]
+    deviations = np.broadcast_to(checked("std", std), stamps.shape)
+    if len(stamps):
+        known = state_at(log, stamps, late).known
+        if in_mount is not None:
+            known &= np.isfinite(in_mount(stamps)).all(axis=-1)
+        inside &= known
+    stamps, seen, deviations = stamps[inside], seen[inside], deviations[inside]
     if len(stamps) < max(_FEWEST, len(free)):
         raise InputError(
             f"{len(stamps)} measured positions lie within {log.source} less {_MOST_OFFSET:g} s at its ends; it needs {_FEWEST}"
@@ -110,18 +125,20 @@ def estimate(
     names, mounted = tuple(free), np.eye(3) if R_body_mount is None else np.asarray(R_body_mount, dtype=float)
     base = np.array([start[LEVER.index(name)] if name in LEVER else 0.0 for name in names])
     variance = state_at(log, stamps, late).position_covariance.diagonal(axis1=1, axis2=2).mean(axis=1)
-    weight = 1.0 / np.sqrt(std**2 + variance)
+    weight = 1.0 / np.sqrt(deviations**2 + variance)
 
     smooth = _smoothed(log)
 
     def residuals(values: Array, of: VehicleLog = log) -> Array:
         value = dict(zip(names, values, strict=True))
-        state = state_at(of, stamps - np.clip(value.get("offset_s", 0.0), -_MOST_OFFSET, _MOST_OFFSET), late)
+        points, vehicle, joints = (float(np.clip(value.get(name, 0.0), -_MOST_OFFSET, _MOST_OFFSET)) for name in _TIMES)
+        later = replace(late, position=late.position + vehicle, attitude=late.attitude + vehicle)
+        state = state_at(of, stamps - points, later)
         r = np.array([value.get(name, start[i]) for i, name in enumerate(LEVER)])
         arm = np.broadcast_to(r, (len(stamps), 3))
         if in_mount is not None:
             turn = Rotation.from_rotvec([value.get(name, 0.0) for name in ANGLES]).as_matrix() @ mounted
-            arm = arm + in_mount(state.t) @ turn.T
+            arm = arm + in_mount(state.t + joints) @ turn.T
         predicted = state.ecef + np.einsum("nij,nj->ni", state.R_ecef_body, arm)
         off: Array = np.nan_to_num(frame.enu(predicted) - frame.enu(seen)) * weight[:, None]
         return off.ravel()
@@ -138,16 +155,18 @@ def estimate(
         values = values + step
         if (np.abs(step) < _CLOSE).all():
             break
+    for name in set(names) & set(_TIMES):
+        if abs(values[names.index(name)]) >= _MOST_OFFSET:
+            raise InputError(f"{name} is beyond {_MOST_OFFSET:g} s; set the clocks nearer before it is estimated")
     J, off = slopes(values), residuals(values)
     scales = np.array([_STEPS[name] for name in names])
     normal = (J * scales).T @ (J * scales)
     if np.linalg.cond(normal) > _SINGULAR:
         raise InputError(f"the manoeuvre does not tell {', '.join(names)} apart; it must turn, and change its speed")
     covariance = np.linalg.inv(normal) * np.outer(scales, scales)
-    if "offset_s" in names and len(names) > 1:
-        told = 1.0 / covariance[names.index("offset_s"), names.index("offset_s")]
-        if told < _NOISE * _made_up(log, weight, variance):
-            raise InputError("the manoeuvre does not tell the time from the lever arm; it must turn, and change its speed")
+    clocks = [names.index(name) for name in (*OFFSET, *VEHICLE) if name in names]
+    if clocks and len(names) > 1 and 1.0 / covariance[clocks[0], clocks[0]] < _NOISE * _made_up(log, weight, variance):
+        raise InputError("the manoeuvre does not tell the time from the lever arm; it must turn, and change its speed")
     for name, deviation in zip(names, np.sqrt(np.diag(covariance)), strict=True):
         worst = next(bound for kind, bound in _WORST.items() if name.startswith(kind))
         if deviation > worst:

@@ -23,6 +23,7 @@ from boom_model import InputError
 from boom_model.arrays import Array, Mask, checked, read_only
 from planner.field import attitude
 from planner.field.earth import axes, geodetic_of
+from planner.field.intervals import intervals
 from planner.field.vehicle_log import VehicleLog
 
 CHI_SQUARE_95 = 5.991464547107979
@@ -235,10 +236,9 @@ def state_at(log: VehicleLog, times: Array, latencies: Latencies) -> State:
     side.
     """
     true = times - latencies.trigger
-    at_position, reasons = _intervals(log, true + latencies.position)
-    at_attitude, others = _intervals(log, true + latencies.attitude)
+    k, u, reasons = _intervals(log, true + latencies.position)
+    m, w, others = _intervals(log, true + latencies.attitude)
     reasons = tuple(first or second for first, second in zip(reasons, others, strict=True))
-    (k, u), (m, w) = at_position, at_attitude
     dt = np.diff(log.t)
     h = dt[k][:, None]
     p0, p1, s = log.ecef[k], log.ecef[k + 1], u[:, None]
@@ -295,22 +295,6 @@ def _where(known: Mask, values: Array) -> Array:
     return np.where(known.reshape(-1, *(1,) * (values.ndim - 1)), values, np.nan)
 
 
-def _intervals(log: VehicleLog, stamps: Array) -> "tuple[tuple[NDArray[np.int_], Array], tuple[str, ...]]":
-    """Return the interval of each time stamp, the share of it that has passed, and why it may not be used."""
-    last = len(log.t) - 2
-    k = np.clip(np.searchsorted(log.t, stamps, side="right") - 1, 0, last)
-    u = np.clip((stamps - log.t[k]) / (log.t[k + 1] - log.t[k]), 0.0, 1.0)
-    gaps, jumps = log.gaps, log.jumps
-    reasons = []
-    for stamp, i in zip(stamps, k, strict=True):
-        if stamp < log.t[0]:
-            reasons.append(f"{log.t[0] - stamp:.3g} s before {log.source} begins")
-        elif stamp > log.t[-1]:
-            reasons.append(f"{stamp - log.t[-1]:.3g} s after {log.source} ends")
-        elif gaps[i]:
-            reasons.append(f"in a gap of {log.t[i + 1] - log.t[i]:.3g} s before line {log.lines[i + 1]}")
-        elif jumps[i] > 0.0:
-            reasons.append(f"in a jump of {jumps[i]:.3g} m before line {log.lines[i + 1]}")
-        else:
-            reasons.append("")
-    return (k, u), tuple(reasons)
+def _intervals(log: VehicleLog, stamps: Array) -> "tuple[NDArray[np.int_], Array, tuple[str, ...]]":
+    flaws = (("gap", np.where(log.gaps, np.diff(log.t), 0.0), "s"), ("jump", log.jumps, "m"))
+    return intervals(log.t, stamps, log.source, log.lines, flaws)

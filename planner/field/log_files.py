@@ -21,7 +21,7 @@ from planner.field.assumed import (
 from planner.field.earth import datum_note, ecef_from, ecef_of, geodetic_of
 from planner.field.nmea import read_nmea
 from planner.field.tables import TIME_COLUMNS, LogTable, read_table
-from planner.field.vehicle_log import LATITUDE, VehicleLog
+from planner.field.vehicle_log import ANGLE_DEVIATION, DEVIATION, LATITUDE, VehicleLog, listed, require_each
 
 ANGLES = ("latitude", "longitude", "roll", "pitch", "heading")
 _STD = ("std_east_m", "std_north_m", "std_up_m")
@@ -65,6 +65,21 @@ class Triggers:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Positions of one point, measured from outside or by a second receiver."""
+
+    t: Array
+    """(n,) [s]"""
+    ecef: Array
+    """(n, 3) [m]"""
+    std: Array
+    """(n,) of each coordinate [m]"""
+    clock: str
+    source: str
+    notes: tuple[str, ...] = ()
+
+
 def read_vehicle_log(path: str | Path, epsg: int | None = None, longest_gap: float | None = None) -> VehicleLog:
     """Read the log of a vehicle: NMEA if it begins with `$` or `!`, otherwise CSV.
 
@@ -99,7 +114,8 @@ def read_vehicle_log(path: str | Path, epsg: int | None = None, longest_gap: flo
         clock=clock,
         source=str(path),
         longest_gap=longest_gap,
-        notes=(*notes, *lost, *doubled, *placed, *turned, *assumed),
+        lost=lost,
+        notes=(*notes, *doubled, *placed, *turned, *assumed),
     )
 
 
@@ -142,7 +158,37 @@ def read_triggers(path: str | Path) -> Triggers:
     return Triggers(read_only(t), tuple(labels), clock, str(path), notes)
 
 
-def require_one_clock(*logs: VehicleLog | JointLog | Triggers) -> None:
+def read_points(path: str | Path, epsg: int | None = None) -> Points:
+    """Read measured positions of a point: NMEA, or CSV with the time and position columns of a vehicle's log.
+
+    Args:
+        path: the file.
+        epsg: reference system of easting_m and northing_m.
+
+    Raises:
+        InputError: it cannot be read or is malformed; names the line and what is wrong.
+    """
+    if _is_nmea(path):
+        log = read_nmea(path)
+        return Points(log.t, log.ecef, _mean_std(log.position_covariance), log.clock, str(path), log.notes)
+    table, notes = read_table(path, VEHICLE_COLUMNS)
+    table, lost = _with_fix(table)
+    t, clock = table.times()
+    table, t, doubled = _without_doubles(table, t)
+    latitude, longitude, height, placed = _position(table, epsg)
+    covariance, assumed = _position_covariance(table)
+    ecef, std = ecef_of(latitude, longitude, height), _mean_std(covariance)
+    left = (f"{path}: {listed('without a fix left out', lost)}",) if lost else ()
+    return Points(read_only(t), read_only(ecef), read_only(std), clock, str(path), (*notes, *left, *doubled, *placed, *assumed))
+
+
+def _mean_std(covariance: Array) -> Array:
+    """Return the root mean square (n,) of the standard deviations of covariances (n, 3, 3)."""
+    std: Array = np.sqrt(np.trace(covariance, axis1=-2, axis2=-1) / 3.0)
+    return std
+
+
+def require_one_clock(*logs: VehicleLog | JointLog | Triggers | Points) -> None:
     """Check that all logs have one clock.
 
     Raises:
@@ -168,8 +214,8 @@ def _is_nmea(path: str | Path) -> bool:
     return start[:1] in (b"$", b"!")
 
 
-def _with_fix(table: LogTable) -> tuple[LogTable, tuple[str, ...]]:
-    """Leave out the rows of quality 0, which may be blank."""
+def _with_fix(table: LogTable) -> tuple[LogTable, tuple[int, ...]]:
+    """Leave out the rows of quality 0, which may be blank; return their lines, too."""
     if not table.has("quality"):
         return table, ()
     quality = table.numbers("quality")
@@ -182,8 +228,7 @@ def _with_fix(table: LogTable) -> tuple[LogTable, tuple[str, ...]]:
         return table, ()
     if len(lost) == len(quality):
         raise InputError(f"{table.path}: no row has a fix (quality is 0 throughout)")
-    note = f"{table.path}: {len(lost)} rows without a fix (quality 0) left out, the first at line {table.lines[lost[0]]}"
-    return table.keep(np.flatnonzero(quality != 0)), (note,)
+    return table.keep(np.flatnonzero(quality != 0)), tuple(table.lines[lost].tolist())
 
 
 def _without_doubles(table: LogTable, t: Array) -> tuple[LogTable, Array, tuple[str, ...]]:
@@ -288,7 +333,7 @@ def _attitude(table: LogTable, n: int, ecef: Array) -> tuple[Array, Array, tuple
             usual = HEADING_STD if name == "heading" else TILT_STD
             if table.has(f"std_{name}_deg") or table.has(f"std_{name}_rad"):
                 std[:, i] = _angle(table, f"std_{name}")
-                _not_negative(table, f"std_{name}", std[:, i])
+                require_each(table.path, f"std_{name}", np.degrees(std[:, i]), ANGLE_DEVIATION, table.lines)
             else:
                 std[:, i] = usual
                 assumed.append(f"{name} {np.degrees(usual):g} deg")
@@ -313,7 +358,7 @@ def _position_covariance(table: LogTable) -> tuple[Array, tuple[str, ...]]:
         return covariance_of_quality(quality, table.path, known=table.has("quality"))
     std = np.stack([table.numbers(name) for name in _STD], axis=-1)
     for i, name in enumerate(_STD):
-        _not_negative(table, name, std[:, i])
+        require_each(table.path, name, std[:, i], DEVIATION, table.lines)
     covariance = std[:, :, None] ** 2 * np.eye(3)
     for name, (i, j) in zip(_COVARIANCE, ((0, 1), (0, 2), (1, 2)), strict=True):
         if table.has(name):
@@ -322,9 +367,3 @@ def _position_covariance(table: LogTable) -> tuple[Array, tuple[str, ...]]:
     if negative.any():
         raise InputError(f"{table.where(int(np.argmax(negative)))}: the covariances do not go with the standard deviations")
     return covariance, ()
-
-
-def _not_negative(table: LogTable, name: str, values: Array) -> None:
-    if (values < 0.0).any():
-        k = int(np.argmax(values < 0.0))
-        raise InputError(f"{table.where(k)}: {name} is {values[k]:g}; it must not be negative")

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
 
 from boom_model import InputError
 from boom_model.arrays import Array
+from planner.field import attitude
 from planner.field.assumed import (
     HEADING_STD,
     NO_TILT_STD,
@@ -25,10 +27,10 @@ from planner.field.assumed import (
 from planner.field.earth import ecef_of
 from planner.field.extra import library
 from planner.field.tables import UTC_CLOCK
-from planner.field.vehicle_log import VehicleLog
+from planner.field.vehicle_log import DEVIATION, VehicleLog, listed
 
 _NEAR = 1.0  # [s] between a fix and an attitude that may be used for it
-_LISTED = 3
+_APART = 0.2  # [s] that is pointed out
 _HALF_DAY = timedelta(hours=12)
 
 
@@ -119,8 +121,8 @@ def _take(read: _Sentences, sentence: Any, line: int) -> None:
         read.fixes.append((at, float(sentence.lat), float(sentence.lon), height, sentence.quality, line))
     elif kind == "GST":
         east, north, up = float(sentence.stdLong), float(sentence.stdLat), float(sentence.stdAlt)
-        if min(east, north, up) <= 0.0:
-            raise ValueError("a standard deviation that is not positive")
+        if min(east, north, up) <= 0.0 or max(east, north, up) > DEVIATION.high:
+            raise ValueError("a standard deviation that is not plausible")
         read.std[_instant(read, sentence.time)] = (east, north, up)
     elif kind == "ASHR":
         angles = float(sentence.roll), float(sentence.pitch), float(sentence.trueHdg)
@@ -146,9 +148,8 @@ def _log(path: str, read: _Sentences, longest_gap: float | None) -> VehicleLog:
     values = np.array([fix[1:5] for fix in read.fixes])
     latitude, longitude, height = np.radians(values[:, 0]), np.radians(values[:, 1]), values[:, 2]
     quality, lines = values[:, 3].astype(int), np.array([fix[5] for fix in read.fixes])
-    notes = [_listed(path, what, found) for what, found in (
-        ("sentences that are broken or have a wrong checksum", read.broken), ("GGA without a fix", read.lost),
-    ) if found]  # fmt: skip
+    broken = "broken or with a wrong checksum, left out"
+    notes = [f"{path}: {listed(broken, read.broken)}"] if read.broken else []
     std = np.array([read.std.get(fix[0], (np.nan,) * 3) for fix in read.fixes])
     if np.isfinite(std).all():
         covariance = std[:, :, None] ** 2 * np.eye(3)
@@ -176,6 +177,7 @@ def _log(path: str, read: _Sentences, longest_gap: float | None) -> VehicleLog:
         clock=UTC_CLOCK,
         source=path,
         longest_gap=longest_gap,
+        lost=tuple(read.lost),
         notes=tuple(notes),
     )
 
@@ -186,15 +188,11 @@ def _attitude(path: str, read: _Sentences, t: Array) -> tuple[Array, Array, tupl
     level = f"{path}: no roll and pitch; assumed level, with a standard deviation of {np.degrees(NO_TILT_STD):g} deg"
     angles = np.zeros((len(t), 3))
     if read.attitudes:
-        at = np.array([each[0].timestamp() for each in read.attitudes])
-        measured = np.unwrap(np.radians([each[1:] for each in read.attitudes]), axis=0)
-        angles[:] = _at_fixes(path, t, at, measured)
-        spread = np.array([TILT_STD, TILT_STD, HEADING_STD])
+        angles[:], said = _at_fixes(path, t, [(each[0].timestamp(), *each[1:]) for each in read.attitudes])
+        spread, notes = np.array([TILT_STD, TILT_STD, HEADING_STD]), said
     elif read.headings:
-        at = np.array([each[0].timestamp() for each in read.headings])
-        heading = np.unwrap(np.radians([each[1] for each in read.headings]))
-        angles[:, 2] = _at_fixes(path, t, at, heading[:, None])[:, 0]
-        spread, notes = np.array([NO_TILT_STD, NO_TILT_STD, HEADING_STD]), (level,)
+        angles[:], said = _at_fixes(path, t, [(each[0].timestamp(), 0.0, 0.0, each[1]) for each in read.headings])
+        spread, notes = np.array([NO_TILT_STD, NO_TILT_STD, HEADING_STD]), (level, *said)
     else:
         angles[:, 2] = np.nan
         return angles, np.array([NO_TILT_STD, NO_TILT_STD, TRACK_STD]), (level,)
@@ -202,17 +200,23 @@ def _attitude(path: str, read: _Sentences, t: Array) -> tuple[Array, Array, tupl
     return angles, spread, (*notes, f"{path}: assumed standard deviations of roll, pitch and heading {figures} deg")
 
 
-def _at_fixes(path: str, t: Array, at: Array, angles: Array) -> Array:
-    order = np.argsort(at, kind="stable")
-    at, angles = at[order], angles[order]
+def _at_fixes(path: str, t: Array, rows: list[tuple[float, float, float, float]]) -> tuple[Array, tuple[str, ...]]:
+    """Return roll, pitch, heading (n, 3) [rad] at the fixes, turned evenly from one row to the next, and a note on gaps.
+
+    Args:
+        path: the file.
+        t: (n,) times of the fixes [s].
+        rows: time [s], roll, pitch, heading [deg].
+    """
+    at, first = np.unique([row[0] for row in rows], return_index=True)
+    turned = Rotation.from_matrix(attitude.rotation(*np.radians([rows[int(k)][1:] for k in first]).T))
     after = np.clip(np.searchsorted(at, t), 0, len(at) - 1)
     away = np.minimum(np.abs(at[after] - t), np.abs(at[np.maximum(after - 1, 0)] - t))
     if (away > _NEAR).any():
         k = int(np.argmax(away > _NEAR))
         raise InputError(f"{path}: the fix at {datetime.fromtimestamp(t[k], UTC):%H:%M:%S} has no attitude within {_NEAR:g} s")
-    return np.stack([np.interp(t, at, column) for column in angles.T], axis=-1)
-
-
-def _listed(path: str, what: str, lines: list[int]) -> str:
-    first = ", ".join(map(str, lines[:_LISTED])) + (", ..." if len(lines) > _LISTED else "")
-    return f"{path}: {len(lines)} {what} left out, line{'s' if len(lines) > 1 else ''} {first}"
+    between = Slerp(at, turned) if len(at) > 1 else None
+    found = attitude.angles((turned if between is None else between(np.clip(t, at[0], at[-1]))).as_matrix())
+    farthest = float(away.max())
+    note = f"{path}: a fix is {farthest:.2g} s from the nearest attitude or heading, which is turned evenly between two"
+    return np.broadcast_to(found, (len(t), 3)), (note,) if farthest > _APART else ()

@@ -1,6 +1,6 @@
-"""Files of plot maps: GeoJSON, shapefile, CSV with WKT, and a trial's TOML.
+"""Files of plot maps: GeoJSON, GeoPackage, shapefile, CSV with WKT, and a trial's TOML.
 
-The one file that uses pyshp.
+The one file that uses pyogrio, which brings GDAL.
 
 What is written is in WGS 84 (EPSG:4326), longitude first, as QGIS reads it.
 """
@@ -8,7 +8,7 @@ What is written is in WGS 84 (EPSG:4326), longitude first, as QGIS reads it.
 import csv
 import json
 import re
-from itertools import pairwise
+import warnings
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,14 +18,18 @@ from pydantic import Field
 from boom_model import InputError
 from boom_model.arrays import Array
 from boom_model.plausible import Range
+from boom_model.provenance import BasisName
 from boom_model.toml_file import Table, read_toml
 from planner.field.earth import GEOGRAPHIC, datum_note, ecef_from, geodetic_of, reference_system
 from planner.field.extra import library
 from planner.field.plots import PlotMap, lay_out
 from planner.field.vehicle_log import ELLIPSOIDAL_HEIGHT
 
-FORMS = (".geojson", ".json", ".shp", ".csv")
+FORMS = (".geojson", ".json", ".gpkg", ".shp", ".csv")
 """Endings of the files that a map is written to."""
+_DRIVERS = {".gpkg": "GPKG", ".shp": "ESRI Shapefile"}
+_LONGEST_ERROR = 200  # letters of GDAL's messages that are shown
+_LONGEST_NAME = 10  # of a shapefile's column
 _NAMES = ("plot", "name", "plot_id", "plotid", "id", "plot_name")
 _DECIMALS = 10  # of a degree: 0.01 mm
 _PLOT_SIDE = Range(0.05, 1e3, "m")
@@ -38,7 +42,7 @@ _Count = Annotated[int, Field(ge=1, le=10_000)]
 
 class _Trial(Table):
     name: str
-    basis: Literal["printed", "estimated", "assumed"]
+    basis: BasisName
     source: str
     rows: _Count
     ranges: _Count
@@ -51,11 +55,11 @@ class _Trial(Table):
 
 
 def read_plots(path: str | Path, epsg: int | None = None) -> PlotMap:
-    """Read a map by the ending of its file: a trial's .toml, .geojson or .json, .shp, or .csv with a column wkt.
+    """Read a map by the ending of its file: a trial's .toml, .geojson or .json, .gpkg, .shp, or .csv with a column wkt.
 
     Args:
         path: the file.
-        epsg: reference system of a shapefile or CSV that does not name its own; EPSG:4326 else.
+        epsg: reference system of a file that does not name its own; EPSG:4326 else.
 
     Raises:
         InputError: the file cannot be read, is malformed, or is of another form; names the plot.
@@ -65,12 +69,10 @@ def read_plots(path: str | Path, epsg: int | None = None) -> PlotMap:
         return _of_trial(Path(path))
     if form in (".geojson", ".json"):
         return _read_geojson(path, epsg)
-    if form == ".shp":
-        return _read_shapefile(path, epsg)
+    if form in _DRIVERS:
+        return _read_layer(path, epsg)
     if form == ".csv":
         return _read_csv(path, epsg)
-    if form == ".gpkg":
-        raise InputError(f"{path}: GeoPackage is not read; export it as GeoJSON, for example with QGIS or ogr2ogr")
     raise InputError(f"{path}: a plot map ends in .toml, {', '.join(FORMS)}")
 
 
@@ -93,8 +95,8 @@ def write_plots(plots: PlotMap, path: str | Path, columns: dict[str, list[Any]] 
             for i, name in enumerate(plots.names):
                 extra = [values[i] for values in more.values()]
                 writer.writerow([name, plots.rows[i] or "", plots.ranges[i] or "", *extra, _wkt(plots, i)])
-    elif form == ".shp":
-        _write_shapefile(plots, path, more)
+    elif form in _DRIVERS:
+        _write_layer(plots, path, more)
     else:
         raise InputError(f"{path}: a plot map is written to {', '.join(FORMS)}")
 
@@ -166,41 +168,60 @@ def _code_of(path: str | Path, data: dict[str, Any], epsg: int | None) -> int:
     return int(code[1])
 
 
-def _read_shapefile(path: str | Path, epsg: int | None) -> PlotMap:
-    shapefile = library("shapefile")
+def _read_layer(path: str | Path, epsg: int | None) -> PlotMap:
+    """Read the one layer of polygons of a GeoPackage or shapefile."""
+    pyogrio, shapely = library("pyogrio"), library("shapely")
     if not Path(path).is_file():
         raise InputError(f"{path}: cannot be read: no such file")
-    if not Path(path).with_suffix(".dbf").is_file():
+    if Path(path).suffix.lower() == ".shp" and not Path(path).with_suffix(".dbf").is_file():
         raise InputError(f"{path}: the file {Path(path).with_suffix('.dbf').name} of its attributes is missing")
     try:
-        with shapefile.Reader(str(path)) as reader:
-            found = []
-            for k, each in enumerate(reader.iterShapeRecords()):
-                if each.shape.shapeType not in (shapefile.POLYGON, shapefile.POLYGONZ, shapefile.POLYGONM):
-                    raise InputError(f"{path}: shape {k + 1} is no polygon")
-                starts = [*each.shape.parts, len(each.shape.points)]
-                rings = [[list(p[:2]) for p in each.shape.points[a:b]] for a, b in pairwise(starts)]
-                found.append((each.record.as_dict(), _rings(f"{path}: shape {k + 1}", rings)))
-    except InputError:
-        raise
-    except Exception as error:  # pyshp raises struct.error, IndexError and others for a file that is cut or changed
-        raise InputError(f"{path}: not a shapefile: {str(error) or type(error).__name__}") from None
-    return _map(path, found, _code_of_projection(path, epsg))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of what GDAL mends, such as the sense of a ring
+            kinds = [(str(name), str(kind)) for name, kind in pyogrio.list_layers(path)]
+            layers = [name for name, kind in kinds if "Polygon" in kind or kind == "Unknown"]
+            if len(layers) != 1:
+                listed = ", ".join(layers or [name for name, _ in kinds]) or "none"
+                raise InputError(f"{path}: its layers{' of polygons' if layers else ''} are {listed}; it needs one of polygons")
+            meta, _, geometry, columns = pyogrio.raw.read(path, layer=layers[0], force_2d=True)
+            shapes = shapely.from_wkb(geometry)
+    except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, shapely.errors.GEOSException, ValueError) as error:
+        driver, said = _DRIVERS[Path(path).suffix.lower()], str(error).splitlines()[0][:_LONGEST_ERROR]
+        raise InputError(f"{path}: cannot be read as {driver}: {said}") from None
+    names = [str(name) for name in meta["fields"]]
+    found = []
+    for k, shape in enumerate(shapes):
+        properties = {name: _cell(column[k]) for name, column in zip(names, columns, strict=True)}
+        found.append((properties, _rings_of_shape(f"{path}: feature {k + 1}", shape)))
+    return _map(path, found, _code_of_layer(path, meta["crs"], epsg))
 
 
-def _code_of_projection(path: str | Path, epsg: int | None) -> int:
-    place = Path(path).with_suffix(".prj")
-    if not place.is_file():
+def _cell(value: Any) -> Any:
+    """Return a whole number as int: a column of them with a blank cell comes as floats."""
+    return int(value) if isinstance(value, np.floating) and float(value).is_integer() else value
+
+
+def _rings_of_shape(where: str, shape: Any) -> list[Array]:
+    parts = [] if shape is None else list(getattr(shape, "geoms", [shape]))
+    if not parts or any(part.geom_type != "Polygon" or part.is_empty for part in parts):
+        raise InputError(f"{where} is no polygon")
+    if len(parts) > 1:
+        raise InputError(f"{where} has several parts; a plot has one")
+    return _rings(where, [ring.coords for ring in (parts[0].exterior, *parts[0].interiors)])
+
+
+def _code_of_layer(path: str | Path, crs: str | None, epsg: int | None) -> int:
+    if crs is None:
         return GEOGRAPHIC if epsg is None else epsg
     pyproj = library("pyproj")
     try:
-        code = pyproj.CRS.from_wkt(place.read_text(encoding="utf-8")).to_epsg(min_confidence=60)
-    except (pyproj.exceptions.CRSError, UnicodeDecodeError, OSError):
+        code = pyproj.CRS.from_user_input(crs).to_epsg(min_confidence=60)
+    except pyproj.exceptions.CRSError:
         code = None
     if code is None and epsg is None:
-        raise InputError(f"{place}: its reference system has no EPSG code; give --epsg CODE")
+        raise InputError(f"{path}: its reference system has no EPSG code; give --epsg CODE")
     if code is not None and epsg is not None and int(code) != epsg:
-        raise InputError(f"{place}: it is EPSG {code}, and {epsg} was given")
+        raise InputError(f"{path}: it is EPSG {code}, and {epsg} was given")
     return int(code) if epsg is None else epsg
 
 
@@ -221,10 +242,7 @@ def _read_csv(path: str | Path, epsg: int | None) -> PlotMap:
             shape = shapely.from_wkt(by_name["wkt"])
         except shapely.errors.GEOSException as error:
             raise InputError(f"{path}, line {line}: wkt is malformed: {str(error).splitlines()[0]}") from None
-        if shape is None or shape.geom_type != "Polygon" or shape.is_empty:
-            raise InputError(f"{path}, line {line}: wkt is no polygon")
-        rings = [list(map(list, shape.exterior.coords)), *(list(map(list, hole.coords)) for hole in shape.interiors)]
-        found.append((by_name, _rings(f"{path}, line {line}", rings)))
+        found.append((by_name, _rings_of_shape(f"{path}, line {line}: wkt", shape)))
     return _map(path, found, GEOGRAPHIC if epsg is None else epsg)
 
 
@@ -288,13 +306,13 @@ def _degrees(ring: Array) -> list[list[float]]:
     return [[round(float(x), _DECIMALS), round(float(y), _DECIMALS)] for x, y in closed]
 
 
-def _wound(plots: PlotMap, i: int, *, anticlockwise: bool) -> list[list[list[float]]]:
-    """Return the rings of a plot [deg], the outer one in a sense, its holes in the other."""
+def _wound(plots: PlotMap, i: int) -> list[list[list[float]]]:
+    """Return the rings of a plot [deg], the outer one anticlockwise, its holes clockwise."""
     wound = []
     for k, ring in enumerate(plots.rings[i]):
         x, y = plots.plane(ring[:, 0], ring[:, 1]).T
         positive = float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum()) > 0.0
-        wound.append(_degrees(ring if positive == (anticlockwise == (k == 0)) else ring[::-1]))
+        wound.append(_degrees(ring if positive == (k == 0) else ring[::-1]))
     return wound
 
 
@@ -304,27 +322,38 @@ def _feature(plots: PlotMap, i: int, more: dict[str, list[Any]]) -> dict[str, An
     return {
         "type": "Feature",
         "properties": properties,
-        "geometry": {"type": "Polygon", "coordinates": _wound(plots, i, anticlockwise=True)},
+        "geometry": {"type": "Polygon", "coordinates": _wound(plots, i)},
     }
 
 
 def _wkt(plots: PlotMap, i: int) -> str:
-    rings = (
-        ", ".join(f"{x:.{_DECIMALS}f} {y:.{_DECIMALS}f}" for x, y in ring) for ring in _wound(plots, i, anticlockwise=True)
-    )
+    rings = (", ".join(f"{x:.{_DECIMALS}f} {y:.{_DECIMALS}f}" for x, y in ring) for ring in _wound(plots, i))
     return f"POLYGON ({', '.join(f'({ring})' for ring in rings)})"
 
 
-def _write_shapefile(plots: PlotMap, path: str | Path, more: dict[str, list[Any]]) -> None:
-    shapefile = library("shapefile")
-    with shapefile.Writer(str(path), shapeType=shapefile.POLYGON) as writer:
-        writer.field("plot", "C", size=40)
-        writer.field("row", "N")
-        writer.field("range", "N")
-        for name, values in more.items():
-            number = all(value is None or isinstance(value, int | float) for value in values)
-            writer.field(name[:10], *(("N", 18, 6) if number else ("C", 60)))
-        for i, name in enumerate(plots.names):
-            writer.poly(_wound(plots, i, anticlockwise=False))
-            writer.record(name, plots.rows[i], plots.ranges[i], *(values[i] for values in more.values()))
-    Path(path).with_suffix(".prj").write_text(reference_system(GEOGRAPHIC).to_wkt("WKT1_ESRI"), encoding="utf-8")
+def _write_layer(plots: PlotMap, path: str | Path, more: dict[str, list[Any]]) -> None:
+    shapely = library("shapely")
+    driver = _DRIVERS[Path(path).suffix.lower()]
+    columns: dict[str, list[Any]] = {"plot": list(plots.names), "row": list(plots.rows), "range": list(plots.ranges), **more}
+    longest = _LONGEST_NAME if driver == "ESRI Shapefile" else None
+    shapes = [shapely.Polygon(rings[0], rings[1:]) for rings in (_wound(plots, i) for i in range(len(plots.names)))]
+    library("pyogrio").raw.write(
+        path,
+        shapely.to_wkb(shapes),
+        [_column(values) for values in columns.values()],
+        [name[:longest] for name in columns],
+        field_mask=[np.array([value is None for value in values]) for values in columns.values()],
+        layer="plots" if longest is None else None,
+        driver=driver,
+        geometry_type="Polygon",
+        crs=f"EPSG:{GEOGRAPHIC}",
+    )
+
+
+def _column(values: list[Any]) -> Any:
+    """Return a column as an array of one type, 0 for None, which its mask leaves blank."""
+    if all(value is None or isinstance(value, int) for value in values):
+        return np.array([value or 0 for value in values], dtype=np.int64)
+    if all(value is None or isinstance(value, int | float) for value in values):
+        return np.array([value or 0.0 for value in values], dtype=float)
+    return np.array(["" if value is None else str(value) for value in values], dtype=object)

@@ -1,8 +1,10 @@
 """A plot map as a picture, in metres east and north of its middle."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
@@ -24,24 +26,28 @@ def map_figure(
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    outlines = [rings_of(polygon)[0] for polygon in plots.polygons]
     scale = ScalarMappable(Normalize(0.0, 1.0), _COLOURS)
-    colours = "#dfe9d8" if coverage is None else scale.to_rgba(coverage)
-    axes.add_collection(PolyCollection(outlines, facecolors=colours, edgecolors="#3c5a2e", linewidths=0.8))
+    draw_plots(axes, plots, "#dfe9d8" if coverage is None else scale.to_rgba(coverage))
     if coverage is not None:
         figure.colorbar(scale, ax=axes, label="share seen")
-    if len(outlines) <= _LABELLED:
-        for name, outline in zip(plots.names, outlines, strict=True):
-            axes.annotate(name, outline.mean(axis=0), ha="center", va="center", fontsize=6)
     if track is not None:
         axes.plot(*track.T, color="#8a4b16", linewidth=1.2, label="track of the mount")
     if points is not None and len(points):
         axes.plot(*points.T, ".", color="#b3261e", markersize=4, label="points")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", fontsize=8)
-    axes.set(aspect="equal", xlabel="east (m)", ylabel="north (m)", title=f"{len(outlines)} plots")
+    axes.set(aspect="equal", xlabel="east (m)", ylabel="north (m)", title=f"{len(plots.names)} plots")
     axes.autoscale_view()
     return figure
+
+
+def draw_plots(axes: Axes, plots: PlotMap, colours: Any) -> None:
+    """Draw outlines of plots, filled with one colour or one each, and their names where there is room."""
+    outlines = [rings_of(polygon)[0] for polygon in plots.polygons]
+    axes.add_collection(PolyCollection(outlines, facecolors=colours, edgecolors="#3c5a2e", linewidths=0.8))
+    if len(outlines) <= _LABELLED:
+        for name, outline in zip(plots.names, outlines, strict=True):
+            axes.annotate(name, outline.mean(axis=0), ha="center", va="center", fontsize=6, clip_on=True)
 
 
 def write_picture(

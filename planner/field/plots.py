@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from boom_model import InputError
-from boom_model.arrays import Array, read_only
+from boom_model.arrays import Array, Mask, read_only
 from planner.field.earth import LocalFrame, ecef_of, geodetic_of
 from planner.field.extra import library
 from planner.field.polygons import probability, rings_of
@@ -136,6 +136,11 @@ class Located:
     """(n,) that the point is on that plot; 0 where there is none"""
     outside: Array
     """(n,) that it is on no plot"""
+
+    @property
+    def on(self) -> Mask:
+        """(n,) where its plot is likelier than no plot."""
+        return np.asarray((self.plot >= 0) & (self.probability > np.nan_to_num(self.outside)))
 
 
 def locate(plots: PlotMap, points: Array, covariance: Array) -> Located:

@@ -5,7 +5,7 @@ The vehicle's axes are x forward, y left, z up, from an origin of the user's cho
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -13,6 +13,7 @@ from pydantic import Field
 from boom_model import Basis, InputError, Origin
 from boom_model.arrays import Array, read_only
 from boom_model.plausible import OFFSET, WIDTH, Range
+from boom_model.provenance import BasisName
 from boom_model.toml_file import Table, read_toml
 from planner.field import attitude
 from planner.field.geotag import Latencies
@@ -25,11 +26,10 @@ _ANGLE_STD = Range(0.0, 45.0, "deg")
 _SIDE = Range(1e-3, 100.0, "m")
 _SHORTEST = 1e-6
 _Point = Annotated[list[Annotated[float, OFFSET]], Field(min_length=3, max_length=3)]
-_Basis = Literal["printed", "estimated", "assumed"]
 
 
 class _Part(Table):
-    basis: _Basis
+    basis: BasisName
     source: str
     latency_s: Annotated[float, _LATENCY] = 0.0
     latency_std_s: Annotated[float, _LATENCY_STD] = 0.0

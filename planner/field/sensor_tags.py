@@ -11,9 +11,10 @@ import numpy as np
 
 from boom_model import Boom, InputError, forward_kinematics
 from boom_model.arrays import Array, Mask, read_only
-from planner.field.arm import lever_arm, play, yielding
+from planner.field.arm import lever_arm, play, up_in_mount, yielding
 from planner.field.earth import axes, geodetic_of
 from planner.field.geotag import Geotags, State, clock_doubts, state_at, tag
+from planner.field.intervals import intervals
 from planner.field.log_files import JointLog, Triggers, require_one_clock
 from planner.field.rig import Rig
 from planner.field.vehicle_log import VehicleLog
@@ -51,6 +52,11 @@ class SensorTags:
         return self.sensor.known
 
     @property
+    def lost(self) -> tuple[str, ...]:
+        """Triggers without a tag, and why."""
+        return tuple(f"{self.triggers.labels[k]}: {self.sensor.reasons[k]}" for k in np.flatnonzero(~self.known))
+
+    @property
     def bearing(self) -> Array:
         """(n,) direction of the view, clockwise from north [rad]; of little use where that is straight down."""
         return np.asarray(np.arctan2(self.view[:, 0], self.view[:, 1]) % (2.0 * np.pi))
@@ -84,9 +90,8 @@ def tag_sensor(boom: Boom, rig: Rig, log: VehicleLog, joints: JointLog, triggers
     part = _known(state, known)
     to_enu = _to_enu(part)
     R = to_enu @ part.R_ecef_body
-    up = np.swapaxes(R, -1, -2)[..., 2] @ rig.R_body_mount
     measured = q[known]
-    bent = yielding(boom, measured, up)
+    bent = yielding(boom, measured, up_in_mount(rig, part.ecef, part.R_ecef_body))
     view_mount = np.einsum("nij,j->ni", forward_kinematics(boom, bent).rotation, rig.view)
     view = np.einsum("nij,nj->ni", R @ rig.R_body_mount, view_mount)
     sensor = tag(part, lever_arm(boom, rig, bent, qd[known], rig.sensor), triggers.t[known], late)
@@ -125,22 +130,10 @@ def tag_sensor(boom: Boom, rig: Rig, log: VehicleLog, joints: JointLog, triggers
 def joints_at(log: JointLog, stamps: Array) -> tuple[Array, Array, tuple[str, ...]]:
     """Return joint positions and rates (n, 5) at time stamps (n,), by lines between samples, and why one has none."""
     dt = np.diff(log.t)
-    longest = max(_GAPS * float(np.median(dt)), _SHORTEST_GAP)
-    finite = np.nan_to_num(stamps, nan=log.t[0] - 1.0)
-    k = np.clip(np.searchsorted(log.t, finite, side="right") - 1, 0, len(dt) - 1)
-    rate = (log.q[k + 1] - log.q[k]) / dt[k][:, None]
-    q = log.q[k] + rate * (finite - log.t[k])[:, None]
-    reasons = []
-    for stamp, i in zip(finite, k, strict=True):
-        if stamp < log.t[0]:
-            reasons.append(f"{log.t[0] - stamp:.3g} s before {log.source} begins")
-        elif stamp > log.t[-1]:
-            reasons.append(f"{stamp - log.t[-1]:.3g} s after {log.source} ends")
-        elif dt[i] > longest:
-            reasons.append(f"in a gap of {dt[i]:.3g} s before line {log.lines[i + 1]} of {log.source}")
-        else:
-            reasons.append("")
-    return q, rate, tuple(reasons)
+    gaps = np.where(dt > max(_GAPS * float(np.median(dt)), _SHORTEST_GAP), dt, 0.0)
+    k, share, reasons = intervals(log.t, stamps, log.source, log.lines, (("gap", gaps, "s"),))
+    step = log.q[k + 1] - log.q[k]
+    return log.q[k] + share[:, None] * step, step / dt[k][:, None], reasons
 
 
 def _depth(rig: Rig, state: State, R: Array, to_enu: Array, sensor: Geotags) -> Array:

@@ -1,4 +1,4 @@
-"""Files of geotags: a table as CSV, and points with footprints as GeoJSON for QGIS."""
+"""Files of geotags: a table as CSV or GeoParquet, and points with footprints as GeoJSON for QGIS."""
 
 import csv
 import json
@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 
 from planner.field.earth import coordinates_in, geodetic_of
+from planner.field.extra import library
 from planner.field.geotag import Geotags, ellipses
 from planner.field.plots import Located, PlotMap
 from planner.field.sensor_tags import SensorTags
 
 _DEGREES, _METRES = 10, 4  # decimals
+_TEXTS = ("label", "plot", "reason")
+_WITH_HEIGHT, _WITHOUT_HEIGHT = "OGC:CRS84h", "OGC:CRS84"
+"""WGS 84, longitude first."""
 
 
 def rows_of(tags: SensorTags, epsg: int, plots: PlotMap | None = None, located: Located | None = None) -> list[dict[str, Any]]:
@@ -45,12 +49,47 @@ def rows_of(tags: SensorTags, epsg: int, plots: PlotMap | None = None, located: 
     return rows
 
 
-def write_csv(path: str | Path, rows: list[dict[str, Any]]) -> None:
-    """Write rows as CSV, None as an empty cell."""
+def write_table(path: str | Path, tags: SensorTags, rows: list[dict[str, Any]]) -> None:
+    """Write rows as CSV, None as an empty cell; or as GeoParquet, if the name ends in .parquet."""
+    if str(path).endswith(".parquet"):
+        _write_geoparquet(path, tags, rows)
+        return
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, fieldnames=list(rows[0]))
         writer.writeheader()
         writer.writerows(rows)
+
+
+def _write_geoparquet(path: str | Path, tags: SensorTags, rows: list[dict[str, Any]]) -> None:
+    """Write GeoParquet 1.1: the sensor's position as `geometry` with its height, what it saw as `footprint`.
+
+    Source: https://geoparquet.org/releases/v1.1.0/
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    shapely, pyproj = library("shapely"), library("pyproj")
+    points = [shapely.Point(_point(row)) if tags.known[k] else None for k, row in enumerate(rows)]
+    rings = [_ring(tags, k) for k in range(len(rows))]
+    footprints = [None if ring is None else shapely.Polygon(ring) for ring in rings]
+    columns = {name: pa.array([row[name] for row in rows], pa.string() if name in _TEXTS else pa.float64()) for name in rows[0]}
+    about = {}
+    for name, shapes, kind, crs in (
+        ("geometry", points, "Point Z", _WITH_HEIGHT),
+        ("footprint", footprints, "Polygon", _WITHOUT_HEIGHT),
+    ):
+        columns[name] = pa.array([None if shape is None else shapely.to_wkb(shape) for shape in shapes], pa.binary())
+        about[name] = {"encoding": "WKB", "geometry_types": [kind], "crs": pyproj.CRS.from_user_input(crs).to_json_dict()}
+        bounds = shapely.total_bounds([shape for shape in shapes if shape is not None]).tolist()
+        if kind == "Point Z":
+            heights = [row["sensor_height_m"] for row in rows if row["sensor_height_m"] is not None]
+            bounds = [*bounds[:2], min(heights), *bounds[2:], max(heights)]
+        if np.isfinite(bounds).all():
+            about[name]["bbox"] = bounds
+    about["footprint"]["orientation"] = "counterclockwise"
+    meta = {"version": "1.1.0", "primary_column": "geometry", "columns": about}
+    table = pa.table(columns).replace_schema_metadata({"geo": json.dumps(meta, allow_nan=False)})
+    pq.write_table(table, path, compression="zstd")
 
 
 def write_geojson(path: str | Path, tags: SensorTags, rows: list[dict[str, Any]]) -> None:
@@ -64,17 +103,28 @@ def _features(tags: SensorTags, rows: list[dict[str, Any]]) -> Iterator[dict[str
     for k, row in enumerate(rows):
         if not tags.known[k]:
             continue
-        point = [row["sensor_longitude_deg"], row["sensor_latitude_deg"], row["sensor_height_m"]]
-        yield {"type": "Feature", "properties": {"of": "sensor", **row}, "geometry": {"type": "Point", "coordinates": point}}
-        if np.isfinite(tags.footprint[k]).all():
-            latitude, longitude, _ = geodetic_of(tags.footprint[k])
-            corners = np.degrees(np.column_stack([longitude, latitude]))
-            ring = [[round(float(x), _DEGREES), round(float(y), _DEGREES)] for x, y in corners]
-            area = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
-            ring = ring if area > 0.0 else ring[::-1]
+        geometry: dict[str, Any] = {"type": "Point", "coordinates": _point(row)}
+        yield {"type": "Feature", "properties": {"of": "sensor", **row}, "geometry": geometry}
+        ring = _ring(tags, k)
+        if ring is not None:
             what = {name: row[name] for name in ("label", "plot", "probability") if name in row}
-            geometry = {"type": "Polygon", "coordinates": [[*ring, ring[0]]]}
+            geometry = {"type": "Polygon", "coordinates": [ring]}
             yield {"type": "Feature", "properties": {"of": "footprint", **what}, "geometry": geometry}
+
+
+def _point(row: dict[str, Any]) -> list[float]:
+    return [row["sensor_longitude_deg"], row["sensor_latitude_deg"], row["sensor_height_m"]]
+
+
+def _ring(tags: SensorTags, k: int) -> list[list[float]] | None:
+    """Return longitude, latitude [deg] of a footprint, anticlockwise and closed; None where there is none."""
+    if not np.isfinite(tags.footprint[k]).all():
+        return None
+    latitude, longitude, _ = geodetic_of(tags.footprint[k])
+    ring = [[round(x, _DEGREES), round(y, _DEGREES)] for x, y in np.degrees(np.column_stack([longitude, latitude])).tolist()]
+    area = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
+    ring = ring if area > 0.0 else ring[::-1]
+    return [*ring, ring[0]]
 
 
 def _columns(of: str, tags: Geotags, epsg: int) -> dict[str, Any]:

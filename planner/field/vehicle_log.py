@@ -1,5 +1,6 @@
 """Log of the vehicle: where one point of it was, how it was turned, and how well both are known."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -22,6 +23,9 @@ LOG_SPEED = Range(-100.0, 100.0, "m/s")
 DEVIATION = Range(0.0, 1e3, "m")
 ANGLE_DEVIATION = Range(0.0, 180.0, "deg")
 
+_QUALITIES = {1: "single", 2: "differential", 3: "PPS", 4: "RTK fixed", 5: "RTK float", 6: "dead reckoning"}
+_RANKS = (4, 5, 2, 3, 1, 6)  # from the best quality to the worst
+_LISTED = 3
 _GAPS = 3.0  # a gap is longer than this many median intervals
 _SHORTEST_GAP = 0.05  # [s]
 _NEIGHBOURS = 7  # intervals whose median velocity a step is compared with
@@ -55,6 +59,8 @@ class VehicleLog:
     """What a message calls the log."""
     longest_gap: float
     """[s] between fixes that may still be interpolated"""
+    lost: tuple[int, ...] = ()
+    """Lines without a fix, which are left out."""
     notes: tuple[str, ...] = field(default=())
 
     @staticmethod
@@ -75,6 +81,7 @@ class VehicleLog:
         clock: str = "own",
         source: str = "vehicle log",
         longest_gap: float | None = None,
+        lost: tuple[int, ...] = (),
         notes: tuple[str, ...] = (),
     ) -> "VehicleLog":
         """Return a log from arrays.
@@ -95,6 +102,7 @@ class VehicleLog:
             clock: what the time is; times of another clock are refused.
             source: what messages call the log.
             longest_gap: [s] that may be interpolated; None is three median intervals.
+            lost: lines without a fix, which are left out.
             notes: what has been assumed or left out.
 
         Raises:
@@ -134,6 +142,7 @@ class VehicleLog:
             clock=clock,
             source=source,
             longest_gap=max(_GAPS * usual, _SHORTEST_GAP) if longest_gap is None else longest_gap,
+            lost=lost,
             notes=notes,
         )
 
@@ -181,13 +190,28 @@ class VehicleLog:
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Gaps, jumps and doubts, one sentence each, naming the line."""
-        said = []
+        """Gaps, jumps, falls of the fix's quality and doubts, one sentence each, naming the line."""
+        said = [f"{self.source}: {listed('without a fix left out', self.lost)}"] if self.lost else []
         for kind, where in (("gap", self.gaps), ("jump", self.jumps > 0.0)):
             for k in map(int, np.flatnonzero(where)):
                 size = f"{self.t[k + 1] - self.t[k]:.3g} s" if kind == "gap" else f"{self.jumps[k]:.3g} m"
                 said.append(f"{self.source}: {kind} of {size} before line {self.lines[k + 1]}")
-        return (*said, *_heading_doubt(self))
+        return (*said, *_falls(self), *_heading_doubt(self))
+
+
+def _falls(log: VehicleLog) -> tuple[str, ...]:
+    """Where the quality of the fix falls below the best that the log has, and for how long."""
+    if log.quality is None:
+        return ()
+    rank = np.array([_RANKS.index(q) if q in _RANKS else len(_RANKS) for q in log.quality.tolist()])
+    worse = np.concatenate([[False], rank > rank.min(), [False]])
+    begins, ends = np.flatnonzero(~worse[:-1] & worse[1:]), np.flatnonzero(worse[:-1] & ~worse[1:])
+    said = []
+    for first, last in zip(begins.tolist(), (ends - 1).tolist(), strict=True):
+        kinds = ", ".join(_QUALITIES.get(q, str(q)) for q in dict.fromkeys(log.quality[first : last + 1].tolist()))
+        lines = f"line {log.lines[first]}" if first == last else f"lines {log.lines[first]} to {log.lines[last]}"
+        said.append(f"{log.source}: the fix is {kinds} on {lines}, {log.t[last] - log.t[first]:.3g} s")
+    return tuple(said)
 
 
 def _heading_doubt(log: VehicleLog) -> tuple[str, ...]:
@@ -207,6 +231,12 @@ def _heading_doubt(log: VehicleLog) -> tuple[str, ...]:
     likely = "; it looks like radians written as degrees" if off(np.degrees(heading)) < 5.0 else ""
     likely = "; it looks like an angle from east, anticlockwise" if off(np.pi / 2.0 - heading) < 5.0 else likely
     return (f"{log.source}: the heading is {off(heading):.0f} deg from the way driven (median){likely}",)
+
+
+def listed(what: str, lines: Sequence[int]) -> str:
+    """Return how many lines are left out and which, the first few of them: "2 lines without a fix left out: 5, 9"."""
+    first = ", ".join(map(str, lines[:_LISTED])) + (", ..." if len(lines) > _LISTED else "")
+    return f"{len(lines)} line{'s' if len(lines) > 1 else ''} {what}: {first}"
 
 
 def require_each(source: str, name: str, values: Array, bounds: Range, lines: NDArray[np.int_]) -> None:

@@ -41,7 +41,7 @@ COMMANDS = (
     "boom catalogue",
     "boom new mine.toml",
 )
-ELSEWHERE = {"view", "jog", "study", "calibrate", "identify", "geotag", "plots", "scan"}
+ELSEWHERE = {"view", "jog", "study", "calibrate", "identify", "geotag", "rig", "plots", "scan"}
 """Commands that need files or a browser; the tests of their rooms look at what they print."""
 SLOW = ("planner.control.study.study", "planner.links.design.design_link", "planner.sizing.choice.choose")
 

@@ -60,6 +60,8 @@ source = "a level field of wheat"
 
 ANTENNA, MOUNT, SENSOR = np.array([0.2, -0.1, 2.9]), np.array([1.2, 0.6, 0.5]), np.array([0.05, 0.02, -0.03])
 
+POSITION_STD = np.array([0.014, 0.014, 0.02])
+
 
 def joint_position(t: Array) -> Array:
     """(n, 5) a slow sweep of the arm, its end effector some 20 deg off the vertical [rad, m]."""
@@ -78,13 +80,22 @@ def sensor_on_vehicle(boom: Boom, q: Array) -> tuple[Array, Array]:
     return MOUNT + (tip.position + tip.rotation @ SENSOR) @ R.T, R @ tip.rotation
 
 
-def write_field(folder: Path, drive: Drive, seconds: float = 20.0, *, utc: float = 1.7830e9) -> dict[str, str]:
-    """Write vehicle.csv, joints.csv, triggers.csv and rig.toml; return their names."""
+def write_field(
+    folder: Path, drive: Drive, seconds: float = 20.0, *, utc: float = 1.7830e9, seed: int | None = None, late: float = 0.0
+) -> dict[str, str]:
+    """Write vehicle.csv, joints.csv, triggers.csv and rig.toml; return their names.
+
+    With a seed, the vehicle's log has the noise that its columns of deviations say; `late` is how
+    late its stamps are.
+    """
     t = np.arange(0.0, seconds, 0.05)
-    latitude, longitude, height = geodetic_of(drive.point(t, ANTENNA))
+    random, noise = np.random.default_rng(seed), 0.0 if seed is None else 1.0
+    place = drive.frame.enu(drive.point(t - late, ANTENNA)) + noise * random.normal(0.0, POSITION_STD, (len(t), 3))
+    latitude, longitude, height = geodetic_of(drive.frame.ecef(place))
     # The inertial sensor is turned by 1.5 deg to the right of the vehicle.
     R_body_imu = attitude.rotation(0.0, 0.0, 0.0).T @ attitude.rotation(0.0, 0.0, np.radians(1.5))
-    angles = np.degrees(attitude.angles(attitude.rotation(*drive.angles(t).T) @ R_body_imu))
+    angles = np.degrees(attitude.angles(attitude.rotation(*drive.angles(t - late).T) @ R_body_imu))
+    angles += noise * random.normal(0.0, [0.05, 0.05, 0.1], (len(t), 3))
     head = "utc,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,heading_deg,"
     head += "std_east_m,std_north_m,std_up_m,std_roll_deg,std_pitch_deg,std_heading_deg,quality"
     rows = [head]
@@ -99,6 +110,15 @@ def write_field(folder: Path, drive: Drive, seconds: float = 20.0, *, utc: float
     (folder / "triggers.csv").write_text("\n".join(["utc,label", *(f"{utc + at:.3f},image-{k}" for k, at in enumerate(times))]))
     (folder / "rig.toml").write_text(RIG)
     return {name: str(folder / f"{name}.csv") for name in ("vehicle", "joints", "triggers")} | {"rig": str(folder / "rig.toml")}
+
+
+def write_points(place: Path, drive: Drive, t: Array, r: Array, *, utc: float = 1.7830e9, seed: int = 0) -> None:
+    """Write a total station's positions of a point at r (3,) or (n, 3) of the vehicle, each to 3 mm."""
+    noisy = drive.frame.enu(drive.point(t, r)) + np.random.default_rng(seed).normal(0.0, 0.003, (len(t), 3))
+    latitude, longitude, height = geodetic_of(drive.frame.ecef(noisy))
+    rows = zip(utc + t, np.degrees(latitude), np.degrees(longitude), height, strict=True)
+    lines = [f"{at:.3f},{y:.11f},{x:.11f},{h:.5f},0.003,0.003,0.003" for at, y, x, h in rows]
+    place.write_text("\n".join(["utc,latitude_deg,longitude_deg,height_m,std_east_m,std_north_m,std_up_m", *lines]) + "\n")
 
 
 def true_spots(boom: Boom, drive: Drive, stamps: Array, q: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ SASKATOON = LocalFrame.at(np.radians(52.13), np.radians(-106.62), 480.0)
 
 @dataclass(frozen=True)
 class Drive:
-    """A gentle curve at a given speed over rough ground."""
+    """A gentle curve at a given mean speed over rough ground."""
 
     speed: float = 1.4
     turning: float = 0.02
@@ -27,10 +27,16 @@ class Drive:
     heave: float = 0.02
     """[m]"""
     frame: LocalFrame = SASKATOON
+    surge: float = 0.0
+    """[m] by which it gets ahead and falls behind, as the speed changes"""
+
+    def _turned(self, t: Array) -> Array:
+        """(n,) heading along the curve [rad]."""
+        return self.begin + self.turning * (t + self.surge / self.speed * np.sin(0.5 * t))
 
     def origin(self, t: Array) -> Array:
         """(n, 3) east, north, up of the vehicle's origin [m]."""
-        heading = self.begin + self.turning * t
+        heading = self._turned(t)
         radius = self.speed / self.turning
         east = radius * (np.cos(self.begin) - np.cos(heading))
         north = radius * (np.sin(heading) - np.sin(self.begin))
@@ -42,7 +48,7 @@ class Drive:
             [
                 self.sway * np.sin(1.9 * t),
                 self.sway * np.cos(1.3 * t + 0.4),
-                self.begin + self.turning * t + 0.3 * self.sway * np.sin(t),
+                self._turned(t) + 0.3 * self.sway * np.sin(t),
             ],
             axis=-1,
         )

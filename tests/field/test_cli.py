@@ -3,7 +3,9 @@
 import csv
 import json
 
+import geopandas
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from rerun.chunk import RrdReader
 
@@ -54,6 +56,36 @@ def test_geotag_writes_where_the_sensor_was(boom, day, tmp_path):
     assert len(features) == 2 * 79
 
 
+def test_geoparquet_is_read_by_geopandas(boom, day, tmp_path):
+    """The same tags as in the CSV, with a trigger that has none."""
+    triggers = (tmp_path / "triggers.csv").read_text()
+    (tmp_path / "triggers.csv").write_text(triggers + "\n1783009999.0,late")
+    for name in ("tags.parquet", "tags.csv"):
+        assert boom(*day, "--plots", "trial.toml", "--out", name)[0] == 0
+    frame = geopandas.read_parquet(tmp_path / "tags.parquet")
+    rows = list(csv.DictReader((tmp_path / "tags.csv").read_text().splitlines()))
+    assert list(frame.columns[:-2]) == list(rows[0])
+    assert len(frame) == len(rows) == 80
+    assert frame.crs.to_authority() == ("OGC", "CRS84h")
+    assert frame.set_geometry("footprint").crs.to_authority() == ("OGC", "CRS84")
+    last = frame.iloc[-1]
+    assert (last.geometry, last.footprint, last.label) == (None, None, "late")
+    assert "after vehicle.csv ends" in last.reason
+    for k, row in enumerate(rows[:-1]):
+        place = [float(row[f"sensor_{name}"]) for name in ("longitude_deg", "latitude_deg", "height_m")]
+        assert frame.geometry[k].coords[0] == pytest.approx(place, abs=1e-9)
+        assert frame.footprint[k].exterior.is_ccw
+        assert frame.probability[k] == float(row["probability"])
+    # In metres of the UTM zone, geopandas is where the columns say.
+    utm = frame.iloc[:-1].to_crs(32613).geometry
+    assert utm.x.to_numpy() == pytest.approx(frame.sensor_x_epsg_32613[:-1].to_numpy(), abs=1e-3)
+    meta = json.loads(pq.read_schema(tmp_path / "tags.parquet").metadata[b"geo"])
+    assert (meta["version"], meta["primary_column"]) == ("1.1.0", "geometry")
+    west, south, low, east, north, high = meta["columns"]["geometry"]["bbox"]
+    assert [west, south, east, north] == pytest.approx(frame.total_bounds)
+    assert low <= frame.sensor_height_m.min() <= frame.sensor_height_m.max() <= high
+
+
 def test_geotag_records_boom_plots_and_map(boom, day, tmp_path):
     code, out, _ = boom(*day, "--plots", "trial.toml", "--recording", "tags.rrd")
     assert (code, "recording: tags.rrd" in out) == (0, True)
@@ -100,9 +132,11 @@ def test_plots(boom, day, tmp_path):
     assert (code, error) == (0, "")
     assert "4 plots, 2 rows x 2 ranges, 128.0 m^2" in out
     assert len(out.splitlines()) <= 24
-    assert sorted(path.name for path in tmp_path.glob("plots.*")) == ["plots.dbf", "plots.prj", "plots.shp", "plots.shx"]
-    code, out, _ = boom("plots", "plots.shp", "--json")
-    assert [plot["plot"] for plot in json.loads(out)["plots"]] == ["1-1", "1-2", "2-1", "2-2"]
+    assert {path.suffix for path in tmp_path.glob("plots.*")} == {".cpg", ".dbf", ".prj", ".shp", ".shx"}
+    assert boom("plots", "plots.shp", "--out", "plots.gpkg")[0] == 0
+    for name in ("plots.shp", "plots.gpkg"):
+        code, out, _ = boom("plots", name, "--json")
+        assert [plot["plot"] for plot in json.loads(out)["plots"]] == ["1-1", "1-2", "2-1", "2-2"]
 
 
 def test_a_corner_is_a_quarter_of_the_plot(boom, day, tmp_path):

@@ -155,6 +155,19 @@ def test_gaps_jumps_and_ends_have_no_position():
     assert np.isnan(found.ecef[2]).all()
 
 
+def test_loss_of_the_fix_is_named_by_its_lines():
+    """Fixed but for two stretches; NMEA's 5 is a float solution, 1 a single one."""
+    exact, quality = Drive().log(T, ANTENNA), np.full(len(T), 4)
+    quality[100:120], quality[300] = [5] * 15 + [1] * 5, 2
+    log = VehicleLog.of(T, *exact.geodetic, *exact.angles.T, quality=quality, lines=np.arange(len(T)) + 2, source="log.csv")
+    assert log.warnings == (
+        "log.csv: the fix is RTK float, single on lines 102 to 121, 0.95 s",
+        "log.csv: the fix is differential on line 302, 0 s",
+    )
+    same = VehicleLog.of(T, *exact.geodetic, *exact.angles.T, quality=np.full(len(T), 2))
+    assert same.warnings == ()
+
+
 def test_noise_is_no_jump():
     for seed in range(20):
         assert not Drive().log(T, ANTENNA, 0.015, 1e-3, seed=seed).warnings

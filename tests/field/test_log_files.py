@@ -69,6 +69,8 @@ def test_clocks_give_the_same_instants(tmp_path):
         (HEAD, [row(0), row(2), row(1)], "line 4: the time goes back by 1 s; split the log"),
         (HEAD, [row(0), row(1, height=1e5)], "line 3: height is 100000 m"),
         (HEAD, [row(0), row(1, quality=12)], "line 3: quality is 12"),
+        (HEAD.replace("quality", "std_heading_deg"), [row(0), row(1, quality=-1)], "line 3: std_heading is -1 deg"),
+        (HEAD.replace("quality", "std_heading_deg"), [row(0), row(1, quality=1e20)], r"line 3: std_heading is 1e\+20 deg"),
         (HEAD, [row(0, quality=0), row(1, quality=0)], "no row has a fix"),
         (HEAD, [row(0), row(1).replace("2026-07-01T15:00:01Z", "2026-07-01T15:00:01")], "line 3: utc is .*, without a zone"),
         (HEAD, [row(0), row(1).replace("52.13", "fifty")], "line 3: latitude_deg is .*; it must be a number"),
@@ -109,7 +111,7 @@ def test_rows_without_a_fix_and_repeated_ones_are_noted(tmp_path):
     rows = [row(0), row(1), row(1), row(2).rsplit(",", 1)[0] + ",0", *(row(k) for k in range(3, 9))]
     log = read_vehicle_log(written(tmp_path, HEAD, *rows))
     assert len(log.t) == 8
-    assert any("1 rows without a fix (quality 0) left out, the first at line 5" in note for note in log.notes)
+    assert log.warnings == (f"{tmp_path / 'log.csv'}: 1 line without a fix left out: 5",)
     assert any("1 rows that repeat the one above" in note for note in log.notes)
 
 
@@ -180,9 +182,22 @@ def test_nmea_over_midnight(tmp_path):
     assert np.linalg.norm(log.ecef - drive.point(kept, ANTENNA), axis=-1).max() < 2e-4
     assert log.angles == pytest.approx(drive.angles(kept), abs=2e-7)
     assert np.sqrt(np.diagonal(log.position_covariance[5])) == pytest.approx([0.012, 0.011, 0.021])
-    assert any("1 sentences that are broken or have a wrong checksum left out, line 10" in note for note in log.notes)
+    assert any("1 line broken or with a wrong checksum, left out: 10" in note for note in log.notes)
     (tmp_path / "log.nmea").write_text("\n".join(line for line in nmea(t, drive, heading=False)))
     assert any("side slip" in note for note in read_vehicle_log(place).notes)
+
+
+def test_nmea_attitude_turns_on_the_sphere_between_its_sentences(tmp_path):
+    """Attitude at every fourth fix alone, over north: halfway in angle, never by way of 180 deg."""
+    drive, t = Drive(begin=-0.05, turning=0.02, sway=0.001), np.arange(0.0, 6.0, 0.25)
+    lines = [line for k, line in enumerate(nmea(t, drive)) if "PASHR" not in line or k // 4 % 4 == 0]
+    place = tmp_path / "log.nmea"
+    place.write_text("\r\n".join(lines))
+    log = read_vehicle_log(place)
+    inside = log.t - log.t[0] <= 5.0
+    off = (log.angles - drive.angles(t) + np.pi) % (2.0 * np.pi) - np.pi
+    assert np.abs(off[inside]).max() < 0.001 * 1.9**2 / 8.0 * 1.1  # of a line under a sine, over one second
+    assert any("a fix is 0.75 s from the nearest attitude" in note for note in log.notes)
 
 
 def test_nmea_without_a_date_is_refused(tmp_path):

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pyogrio
 import pytest
 import shapely
 from geographiclib.geodesic import Geodesic
@@ -53,6 +54,56 @@ def test_files_there_and_back(form, tmp_path):
     assert (again.rows, again.ranges) == (plots.rows, plots.ranges)
     for ours, theirs in zip(plots.polygons, again.at_height(480.0).polygons, strict=True):
         assert ours.symmetric_difference(theirs).area < 1e-3 * 3.6
+
+
+def test_geopackage_as_qgis_writes_it(tmp_path):
+    """Multipolygons in UTM with heights, numbers with a blank as names, beside a table and a layer of points."""
+    plots, _ = trial()
+    place = tmp_path / "field.gpkg"
+    rings = [coordinates_in(32613, ecef_of(*plot[0].T, 480.0)) for plot in plots.rings[:3]]
+    assert rings[0].shape == (4, 3)
+    shapes = shapely.to_wkb([shapely.MultiPolygon([shapely.Polygon(ring)]) for ring in rings])
+    pyogrio.raw.write(
+        place, shapes, [np.array([101, 102, 103])], ["plot_id"], layer="trial", driver="GPKG", geometry_type="MultiPolygon Z",
+        crs="EPSG:32613",
+    )  # fmt: skip
+    pyogrio.raw.write(
+        place, shapely.to_wkb([shapely.Point(4e5, 5.7e6)]), [np.array(["gate"], dtype=object)], ["what"], layer="gates",
+        driver="GPKG", geometry_type="Point", crs="EPSG:32613", append=True,
+    )  # fmt: skip
+    again = read_plots(place)
+    assert again.names == ("101", "102", "103")
+    for ours, theirs in zip(plots.rings, again.rings, strict=False):
+        assert np.abs(ours[0] - theirs[0]).max() < 1e-12 * np.pi
+    with pytest.raises(InputError, match="it is EPSG 32613, and 32614 was given"):
+        read_plots(place, 32614)
+
+
+def test_layers_that_are_not_told_apart_are_refused(tmp_path):
+    place = tmp_path / "field.gpkg"
+    square = shapely.to_wkb([shapely.box(0.0, 0.0, 1e-4, 1e-4)])
+    for name in ("wheat", "barley"):
+        pyogrio.raw.write(
+            place, square, [], [], layer=name, driver="GPKG", geometry_type="Polygon", crs="EPSG:4326", append=True
+        )
+    with pytest.raises(InputError, match="its layers of polygons are wheat, barley; it needs one of polygons"):
+        read_plots(place)
+
+
+@pytest.mark.parametrize("form", [".gpkg", ".shp"])
+def test_files_of_gdal_that_are_cut_or_changed_are_refused_in_a_line(form, tmp_path):
+    write_plots(trial()[0], tmp_path / f"whole{form}")
+    data, random, messages = (tmp_path / f"whole{form}").read_bytes(), np.random.default_rng(5), []
+    for k in range(60):
+        at = int(random.integers(len(data)))
+        changed = data[:at] if k % 2 else data[:at] + bytes(random.integers(0, 256, 64, dtype=np.uint8)) + data[at + 64 :]
+        (tmp_path / f"whole{form}").write_bytes(changed)
+        try:
+            read_plots(tmp_path / f"whole{form}")
+        except InputError as error:
+            messages.append(str(error))
+    assert len(messages) > 15
+    assert not [text for text in messages if "\n" in text or len(text) > 400]
 
 
 def test_a_trial_in_utm_is_the_same(tmp_path):

@@ -5,13 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from boom_model import Boom, InputError, inverse_dynamics, jacobian, tip_deflection
+from boom_model import Boom, InputError, forward_kinematics, inverse_dynamics, jacobian, tip_deflection
 from planner.field import attitude
 from planner.field.arm import lever_arm, play, yielding
-from planner.field.log_files import JointLog, read_joint_log, read_triggers, read_vehicle_log
+from planner.field.earth import geodetic_of
+from planner.field.geotag import Latencies
+from planner.field.log_files import JointLog, Triggers, read_joint_log, read_triggers, read_vehicle_log
 from planner.field.rig import read_rig
 from planner.field.sensor_tags import joints_at, tag_sensor
+from planner.field.vehicle_log import VehicleLog
 from tests.builders import without_drives
 from tests.field.field_files import FRAME, joint_position, true_spots, write_field
 from tests.field.motions import Drive
@@ -136,6 +140,75 @@ def _antenna(log, t):
     k = int(np.searchsorted(log.t, t)) - 1
     u = (t - log.t[k]) / (log.t[k + 1] - log.t[k])
     return (1.0 - u) * log.ecef[k] + u * log.ecef[k + 1]
+
+
+def test_simulated_field_errs_as_predicted(tmp_path):
+    """A minute at 1.4 m/s with 20 Hz RTK and 100 Hz joints as files; tagged at the fixes, the RMS is what the tags say."""
+    boom, drive = without_drives(Boom.load()), Drive()
+    names = write_field(tmp_path, drive, 60.0, seed=21)
+    quiet = replace(
+        read_rig(names["rig"]),
+        antenna_std=0.0,
+        imu_std=0.0,
+        mount_std=0.0,
+        mount_turn_std=0.0,
+        joint_std=np.zeros(5),
+        sensor_std=0.0,
+    )
+    t = np.arange(20, 1180) * 0.05
+    triggers = Triggers(t + 0.02 + 1.7830e9, tuple(map(str, t)), "utc", "triggers")
+    found = tag_sensor(boom, quiet, read_vehicle_log(names["vehicle"]), read_joint_log(names["joints"]), triggers).sensor
+    true, _ = true_spots(boom, drive, t + 0.02, joint_position(t))
+    rms = np.sqrt(((FRAME.enu(found.ecef) - true) ** 2).mean(axis=0))
+    predicted = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2).mean(axis=0))
+    assert rms == pytest.approx(predicted, rel=0.07)  # 2 % is the noise of an RMS of 1,160
+    assert predicted == pytest.approx([0.0149, 0.0149, 0.0204], rel=0.05)  # 14, 14, 20 mm, and the attitude over 3 m
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_whole_chains_covariance_equals_monte_carlo(seed, day):
+    """A random rig, pose and motion: every error of logs, rig and clocks drawn 100,000 times, the chain written out again."""
+    boom, random, count = without_drives(Boom.load()), np.random.default_rng(300 + seed), 100_000
+    late = Latencies(position_std=0.008, attitude_std=0.02, joints_std=0.01, trigger_std=0.005)
+    imu, mounting = (attitude.rotation(0.0, 0.0, 0.0).T @ attitude.rotation(*random.uniform(-0.3, 0.3, 3)) for _ in range(2))
+    rig = replace(
+        day[0], antenna=random.uniform(-1.5, 1.5, 3), mount=random.uniform(-1.5, 1.5, 3), sensor=random.uniform(-0.2, 0.2, 3),
+        R_body_imu=imu, R_body_mount=mounting, antenna_std=0.004, mount_std=0.005, sensor_std=0.003, imu_std=0.002,
+        mount_turn_std=0.003, joint_std=np.array([1e-3, 1e-3, 1e-3, 2e-3, 1e-3]), latencies=late,
+    )  # fmt: skip
+    q0 = joint_position(random.uniform(0.0, 20.0, 1))[0] + random.uniform(-0.3, 0.3, 5) * [1, 0.2, 0.2, 0.2, 1]
+    qd, v = random.uniform(-0.3, 0.3, 5), random.uniform(-1.5, 1.5, 3) * [1, 1, 0.1]
+    angles, spin = random.uniform([-0.1, -0.1, 0.0], [0.1, 0.1, 6.28]), random.uniform(-0.2, 0.2, 3)
+    P, S = np.diag([0.014, 0.014, 0.02]) ** 2, np.diag([0.001, 0.001, 0.002]) ** 2
+    t, at = np.arange(-0.5, 0.5, 0.002), 0.0003
+    log = VehicleLog.of(
+        t, *geodetic_of(FRAME.ecef(v * t[:, None])), *(angles + spin * t[:, None]).T,
+        velocity=np.tile(v, (len(t), 1)), position_covariance=P, attitude_covariance=S,
+    )  # fmt: skip
+    joints = JointLog(t, q0 + qd * t[:, None], "own", "joints", np.arange(len(t)))
+    found = tag_sensor(boom, rig, log, joints, Triggers(np.array([at]), ("one",), "own", "triggers")).sensor
+
+    def normal(std, *shape):
+        return random.normal(0.0, std, (count, *shape))
+
+    stamp, fix, turn, joint = (
+        normal(std)[:, None] for std in (late.trigger_std, late.position_std, late.attitude_std, late.joints_std)
+    )
+    antenna = v * (at + stamp + fix) + random.multivariate_normal(np.zeros(3), P, count)
+    drawn = angles + spin * (at + stamp + turn) + random.multivariate_normal(np.zeros(3), S, count)
+    body = attitude.rotation(*drawn.T) @ imu.T @ Rotation.from_rotvec(normal(rig.imu_std, 3)).as_matrix()
+    tip = forward_kinematics(boom, q0 + qd * (at + stamp + joint) + normal(1.0, 5) * rig.joint_std)
+    arm = tip.position + np.einsum("nij,nj->ni", tip.rotation, rig.sensor + normal(rig.sensor_std, 3))
+    arm = np.einsum("nij,nj->ni", Rotation.from_rotvec(normal(rig.mount_turn_std, 3)).as_matrix() @ mounting, arm)
+    arm += rig.mount + normal(rig.mount_std, 3) - rig.antenna - normal(rig.antenna_std, 3)
+    samples = antenna + np.einsum("nij,nj->ni", body, arm)
+    theirs = np.cov(samples.T)
+    scale = np.sqrt(np.outer(np.diag(theirs), np.diag(theirs)))
+    assert (np.abs(found.covariance[0] - theirs) / scale).max() < 0.03
+    off = samples - FRAME.enu(found.ecef[0])
+    assert off.mean(axis=0) == pytest.approx(np.zeros(3), abs=1e-3)
+    squares = np.einsum("ni,ij,nj->n", off[:, :2], np.linalg.inv(found.covariance[0, :2, :2]), off[:, :2])
+    assert 0.94 < np.mean(squares < 5.991464547107979) < 0.96
 
 
 def test_gaps_of_the_joints_and_clocks():
