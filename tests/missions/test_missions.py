@@ -196,7 +196,7 @@ def test_a_step_to_where_it_stands_moves_nothing(mission):
 @pytest.mark.parametrize(
     ("steps", "said"),
     [
-        ("[[steps]]\n", "one of to, hold_s, pause_s and repeat; this one has none"),
+        ("[[steps]]\n", "one of to, hold_s, pause_s, motion and repeat; this one has none"),
         ('[[steps]]\nto = "transport"\nhold_s = 1\n', "this one has to, hold_s"),
         ("[[steps]]\nhold_s = 1\nduration_s = 2\n", "a step with hold_s takes no duration_s"),
         ("[[steps]]\nrepeat = 2\n", "a step with repeat needs steps of its own"),
@@ -205,6 +205,7 @@ def test_a_step_to_where_it_stands_moves_nothing(mission):
         ("[[steps]]\nhold_s = nan\n", "key steps.0.hold_s"),
         ("[[steps]]\nhold_s = 1\ncolour = 3\n", "key steps.0.colour is not known"),
         ("steps = []\n", "key steps"),
+        ("[[steps]]\nmotion = [[0, 1, 2]]\n", "key steps.0.motion"),
     ],
 )
 def test_a_bad_mission_names_file_and_key(mission, steps, said):

@@ -1,0 +1,225 @@
+"""The day of a row scan: the vehicle's drives and turns, and the boom's moves, in time; and the same as a mission."""
+
+from collections.abc import Iterator
+from itertools import groupby, pairwise
+
+import numpy as np
+
+from boom_model.arrays import Array
+from planner.field.scan import Scan, first_line, ground_name, targets_of
+from planner.field.scan_rows import Beside, Row, length, turn
+from planner.field.scan_task import Leg, Visit
+from planner.planning import Move
+
+_SHORTEST = 0.01  # [s] of a mission's hold
+_DIGITS = 9
+_KNOTS = 0.05  # [s] between samples of a motion in a mission file
+
+Work = list[tuple[Beside, Visit]]
+
+
+def legs(scan: Scan) -> tuple[Leg, ...]:
+    """Return the vehicle's day, row by row, with a turn between two of them."""
+    found: list[Leg] = []
+    here = ""
+    for row in scan.rows:
+        work = [(b, v) for b, v in zip(scan.beside, scan.visits, strict=True) if b.row == row.number and v.lines]
+        if not work:
+            continue
+        mine = list(_stops(scan, row, work, here) if scan.task.speed is None else _drives(scan, row, work, here))
+        if found:
+            way = turn(found[-1].way[-1], _ahead(found[-1]), mine[0].way[0], scan.task.turn_radius)
+            found.append(Leg("turn", length(way) / scan.task.drive_speed, way, None, held=here))
+        found += mine
+        here = _last(mine)
+    return tuple(found)
+
+
+def _ahead(leg: Leg) -> Array:
+    return leg.ahead if leg.ahead is not None else np.array([1.0, 0.0])
+
+
+def _last(found: list[Leg]) -> str:
+    return found[-1].moves[-1].split(" to ")[-1] if found[-1].moves else found[-1].held
+
+
+def _stops(scan: Scan, row: Row, work: Work, here: str) -> Iterator[Leg]:
+    last = None
+    for each, visit in work:
+        targets = targets_of(visit, scan.task)
+        for stop in visit.stops:
+            place = row.at(each.along + stop, scan.offset)[None]
+            if last is not None:
+                way = np.vstack([last, place])
+                yield Leg("drive", length(way) / scan.task.drive_speed, way, row.ahead, held=here)
+            order = targets[::-1] if here == targets[-1] else targets
+            moves = tuple(f"{a} to {b}" for a, b in pairwise(order))
+            seconds = max(sum(scan.moves[name].report.duration for name in moves), 1.0 / scan.task.rate)
+            yield Leg("stop", seconds, place, row.ahead, moves, held=order[0], plot=each.plot)
+            last, here = place, order[-1]
+
+
+def _drives(scan: Scan, row: Row, work: Work, here: str) -> Iterator[Leg]:
+    if work[0][1].ground:
+        yield from _over_ground(scan, row, work)
+        return
+    speed = scan.task.speed or 1.0
+    ends = np.array([row.at(x, scan.offset) for x in row.span])
+    seconds = length(ends) / speed
+    targets = targets_of(max((visit for _, visit in work), key=lambda visit: len(visit.lines)), scan.task)
+    order = targets[::-1] if here == targets[-1] else targets
+    for number, target in enumerate(order):
+        if number:
+            name = f"{order[number - 1]} to {target}"
+            back = max(length(ends) / scan.task.drive_speed, scan.moves[name].report.duration)
+            yield Leg("back", back, ends[::-1], row.ahead, (name,), held=order[number - 1])
+        yield Leg("pass", seconds, ends, row.ahead, held=target)
+
+
+def _over_ground(scan: Scan, row: Row, work: Work) -> Iterator[Leg]:
+    speed = scan.task.speed or 1.0
+    last = None
+    for number in range(len(work[0][1].ground)):
+        side = 0
+        for position, (each, visit) in enumerate(work):
+            crossing = visit.ground[number][0].crossing
+            begin = each.along + first_line(each, crossing.lines, scan.task) + crossing.begin
+            ends = np.array([row.at(begin + x, scan.offset) for x in (0.0, crossing.travel)])
+            name, forward = ground_name(number, side), " to ".join(visit.ground[number][side].forward)
+            if position == 0 and last is not None:
+                way = np.vstack([last, ends[:1]])
+                yield Leg("back", length(way) / scan.task.drive_speed, way, row.ahead, (), held=_held(scan, name))
+            yield Leg(
+                "pass", scan.moves[name].report.duration, ends, row.ahead, (name,), held=_held(scan, name), plot=each.plot
+            )
+            last = ends[1:]
+            if position + 1 < len(work):
+                after, then = work[position + 1]
+                following = then.ground[number][0].crossing
+                goal = row.at(after.along + first_line(after, following.lines, scan.task) + following.begin, scan.offset)
+                way = np.vstack([last, goal[None]])
+                yield Leg("drive", length(way) / speed, way, row.ahead, (forward,), held=forward.split(" to ")[0])
+            side = (side + crossing.lines) % 2
+
+
+def _held(scan: Scan, name: str) -> str:
+    return f"begin of {name}"
+
+
+def mission_text(scan: Scan) -> str:
+    """Return the day as a mission: from and to transport, with what is alike put together.
+
+    The boom holds still while the vehicle drives and turns. All of that time is spread evenly over
+    the holds, so that the mission lasts as long as the day.
+    """
+    task = scan.task
+    lines = [
+        f"# {len(scan.plots.names)} plots of {scan.plots.source}, as boom scan planned them.",
+        'name = "row scan"',
+        'basis = "estimated"',
+        f'source = "boom scan {"with stops" if task.speed is None else f"at {task.speed:g} m/s"}"',
+        f"plots = {sum(bool(visit.lines) for visit in scan.visits)}",
+        'start = "transport"',
+        f'constraint = "{task.constraint}"',
+    ]
+    body = _ground_steps(scan) if any(visit.ground for visit in scan.visits) else _line_steps(scan)
+    return "\n".join([*lines, *body, *_step(scan, "transport", line=False)]) + "\n"
+
+
+def _line_steps(scan: Scan) -> list[str]:
+    """Return the steps of stops, or of passes of a boom that stands still."""
+    task = scan.task
+    stopped = task.speed is None
+    kind = "stop" if stopped else "pass"
+    blocks = _blocks(scan)
+    moved = sum(scan.moves[name].report.duration for leg in scan.legs for name in leg.moves)
+    holds = len(blocks) if stopped else sum(leg.what == kind for leg in scan.legs)
+    hold = f"{max((scan.duration - moved) / max(holds, 1), _SHORTEST):.4f}"
+    lines: list[str] = []
+    here = ""
+    for targets, group in groupby(blocks):
+        count = len(list(group))
+        order = targets[::-1] if here == targets[-1] else targets
+        if here != order[0]:
+            lines += _step(scan, order[0], line=bool(here))
+        there, back = (_sweep(scan, each, hold) for each in (order, order[::-1]))
+        if count > 1:
+            lines += ["", "[[steps]]", f"repeat = {count // 2}", *(_inner(line) for line in there + back)]
+        if count % 2:
+            lines += there
+        here = order[-1] if count % 2 else order[0]
+    return lines
+
+
+def _blocks(scan: Scan) -> list[tuple[str, ...]]:
+    """Return the targets of every stop, or of every row of passes."""
+    found = []
+    for _, group in groupby(zip(scan.beside, scan.visits, strict=True), lambda pair: pair[0].row):
+        mine = [visit for _, visit in group if visit.lines]
+        if not mine:
+            continue
+        if scan.task.speed is None:
+            found += [targets_of(visit, scan.task) for visit in mine for _ in visit.stops]
+        else:
+            found.append(targets_of(max(mine, key=lambda visit: len(visit.lines)), scan.task))
+    return found
+
+
+def _sweep(scan: Scan, targets: tuple[str, ...], hold: str) -> list[str]:
+    """Return the steps from the first target on: holding after the last, or, driving past, at each."""
+    held = ["", "[[steps]]", f"hold_s = {hold}"]
+    if scan.task.speed is None:
+        return [line for target in targets[1:] for line in _step(scan, target, line=True)] + held
+    return held + [line for target in targets[1:] for line in (*_step(scan, target, line=True), *held)]
+
+
+def _ground_steps(scan: Scan) -> list[str]:
+    """Return the steps of lines over the ground: each move as samples, the way forward, and a hold."""
+    passed = [leg for leg in scan.legs if leg.what == "pass"]
+    visit = next(visit for visit in scan.visits if visit.ground)
+    forward = {
+        ground_name(n, k): " to ".join(each.forward) for n, sides in enumerate(visit.ground) for k, each in enumerate(sides)
+    }
+    moved = sum(scan.moves[name].report.duration for leg in passed for name in (leg.moves[0], forward[leg.moves[0]]))
+    hold = f"{max((scan.duration - moved) / max(len(passed), 1), _SHORTEST):.4f}"
+    lines: list[str] = []
+    for number, sides in enumerate(visit.ground):
+        names = [ground_name(number, side) for side in range(len(sides))]
+        count = sum(leg.moves[0] in names for leg in passed)
+        each = [
+            [
+                *("", "[[steps]]", f"motion = {_samples(scan.moves[name])}"),
+                *_step(scan, side.forward[1], line=True),
+                *("", "[[steps]]", f"hold_s = {hold}"),
+            ]
+            for name, side in zip(names, sides, strict=True)
+        ]
+        lines += ["", "[[steps]]", f'to = "{_joints(scan.moves[names[0]])}"', f'profile = "{scan.task.profile}"']
+        if count >= len(names):
+            repeated = [line for steps in each for line in steps]
+            lines += ["", "[[steps]]", f"repeat = {count // len(names)}", *(_inner(line) for line in repeated)]
+        lines += each[0] if count % len(names) else []
+    return lines
+
+
+def _joints(move: Move) -> str:
+    """Return where a move begins, as a target in degrees and metres."""
+    yaw, inner, lower, extension, wrist = move.trajectory.q[0]
+    angles = [f"{np.degrees(x):.10g}" for x in (yaw, inner, lower, wrist)]
+    return f"q={','.join(angles[:3])},{extension:.10g},{angles[3]}"
+
+
+def _samples(move: Move) -> str:
+    motion = move.trajectory
+    every = max(1, round(_KNOTS / float(motion.t[1] - motion.t[0])))
+    at = np.unique(np.append(np.arange(0, len(motion.t), every), len(motion.t) - 1))
+    rows = np.column_stack([motion.t[at], motion.q[at]])
+    return "[\n" + "".join(f"  [{', '.join(f'{x:.{_DIGITS}f}' for x in row)}],\n" for row in rows) + "]"
+
+
+def _step(scan: Scan, target: str, *, line: bool) -> list[str]:
+    return ["", "[[steps]]", f'to = "{target}"', f'profile = "{scan.task.profile}"', *(['along = "line"'] if line else [])]
+
+
+def _inner(line: str) -> str:
+    return line.replace("[[steps]]", "[[steps.steps]]")
