@@ -17,13 +17,16 @@ from planner.cli.options import (
     outputs,
     payload_option,
     plausible,
+    with_names,
 )
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows, tracked
 
 if TYPE_CHECKING:
+    from boom_model import Boom
     from planner.field.plots import Located, PlotMap
     from planner.field.scan import Scan
     from planner.field.sensor_tags import SensorTags
+    from planner.files import Outputs
     from planner.planning import Move
 
 _EPSG = Range(1024, 999_999, "")
@@ -32,6 +35,7 @@ _SIDE = Range(0.01, 100.0, "m")
 _BESIDE = Range(0.1, 30.0, "m")
 _SHARE = Range(0.0, 0.9, "")
 _PACE = Range(0.01, 10.0, "m/s")
+_RADIUS = Range(0.1, 100.0, "m")
 _PROFILES = ("cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal")
 _SURE = 0.95
 _FEW = 3
@@ -215,19 +219,36 @@ def plots(
 )
 @click.option("--speed", type=float, callback=plausible(_PACE), metavar="M/S", help="Drive past the plots; default: stop.")
 @click.option(
+    "--passes",
+    type=click.IntRange(1, 99),
+    metavar="N",
+    help="Along each row at that speed; default: the fewest that the boom can follow.",
+)
+@click.option(
     "--drive-speed",
     type=float,
     default=1.0,
     show_default=True,
     callback=plausible(_PACE),
     metavar="M/S",
-    help="From stop to stop.",
+    help="From stop to stop, back along a row, and in turns.",
+)
+@click.option(
+    "--turn-radius",
+    type=float,
+    default=4.0,
+    show_default=True,
+    callback=plausible(_RADIUS),
+    metavar="M",
+    help="Of the vehicle's turns between rows (assumed).",
 )
 @click.option("--profile", type=OneOf(_PROFILES), default="jerk-limited", show_default=True, help="How the moves are timed.")
 @constraint_option
 @click.option("--mission", type=OutFile(".toml"), metavar="FILE.toml", help="The scan as a mission, for boom mission and size.")
 @click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="The plots with their coverage.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Plots, coverage and track.")
+@click.option("--recording", type=OutFile(".rrd"), metavar="FILE.rrd", help="The day in 3D, beside a map.")
+@click.option("--report", "document", type=OutFile(".md", ".html", ".pdf"), metavar="FILE", help="Write .md, .html or .pdf.")
 @payload_option
 @_epsg_option
 @boom_option
@@ -239,6 +260,8 @@ def scan(
     mission: str | None,
     out: str | None,
     picture: str | None,
+    recording: str | None,
+    document: str | None,
     payload: float | None,
     epsg: int | None,
     boom_file: str | None,
@@ -251,46 +274,57 @@ def scan(
     \b
     Examples:
       boom scan trial.toml --footprint 0.5,0.5 --mission scan.toml --picture scan.png
-      boom scan trial.toml --footprint 0.5,0.5 --speed 0.5
+      boom scan trial.toml --footprint 0.5,0.5 --speed 0.5 --recording scan.rrd --report scan.pdf
     """
     from boom_model.words import numbers
-    from planner.field.plot_files import read_plots, write_plots
-    from planner.field.plot_picture import write_picture
-    from planner.field.scan import ScanTask, plan_scan
+    from planner.field.plot_files import read_plots
+    from planner.field.scan import plan_scan
+    from planner.field.scan_task import ScanTask
 
-    files = outputs(mission, out, picture, inputs=(source, boom_file))
+    files = outputs(mission, out, picture, recording, document=document, inputs=(source, boom_file))
     along, across = numbers(footprint, footprint, 2)
     _SIDE.require("footprint", (along, across))
     boom, field = load_boom(boom_file, payload), read_plots(source, epsg)
     found = plan_scan(boom, field, ScanTask((along, across), **figures), tracked("planning"))
-    columns: dict[str, list[Any]] = {
-        "coverage": [round(float(x), 4) for x in found.coverage],
-        "overlap": [round(float(x), 2) for x in found.overlap],
-        "time_s": [round(float(x), 1) for x in found.seconds],
-        "energy_J": [round(float(x), 1) for x in found.energy],
-        "reason": [found.unreachable.get(name, "") for name in field.names],
-    }
+    names = {"mission": mission, "plots": out, "picture": picture, "recording": recording, "report": document}
+    written = with_names(names)
+    failed = _failed(found)
     with files:
-        if mission is not None:
-            with open(files.temporary(mission), "w", encoding="utf-8") as file:
-                file.write(found.mission)
-        if out is not None:
-            write_plots(field, files.temporary(out), columns)
-        if picture is not None:
-            write_picture(files.temporary(picture), field, coverage=found.coverage, track=found.track)
-    names = (("mission", mission), ("plots", out), ("picture", picture))
-    written = {kind: name for kind, name in names if name is not None}
+        _write_scan(files, boom, found, written, failed)
     if as_json:
-        print_json(_scan_json(found, columns, written))
+        print_json(_scan_json(found, written))
     else:
         _print_scan(found, whole)
         print_files(written)
         then = f"boom mission {mission}" if mission else f"boom scan {source} --footprint {footprint} --mission scan.toml"
         print_lines("next", [then])
-    failed = _failed(found)
     if failed:
         complain(failed)
     return ANSWER_IS_NO if failed else 0
+
+
+def _write_scan(files: "Outputs", boom: "Boom", found: "Scan", written: dict[str, str], failed: str) -> None:
+    """Write the files of a scan by kind."""
+    from planner.field.plot_files import write_plots
+    from planner.field.plot_picture import map_figure, write_picture
+    from planner.field.scan_report import scan_columns, scan_report
+    from planner.reports.document import write_document
+
+    place = {kind: files.temporary(name) for kind, name in written.items()}
+    look = {"coverage": found.coverage, "track": found.track}
+    if "mission" in place:
+        with open(place["mission"], "w", encoding="utf-8") as file:
+            file.write(found.mission)
+    if "plots" in place:
+        write_plots(found.plots, place["plots"], scan_columns(found))
+    if "picture" in place:
+        write_picture(place["picture"], found.plots, **look)
+    if "recording" in place:
+        from planner.recording.scan import write_scan_recording  # slow to import
+
+        write_scan_recording(place["recording"], boom, found)
+    if "report" in place:
+        write_document(place["report"], scan_report(found, failed), {"The field": map_figure(found.plots, **look)})
 
 
 def _failed(found: "Scan") -> str:
@@ -307,13 +341,13 @@ def _failed(found: "Scan") -> str:
 
 
 def _print_scan(found: "Scan", whole: bool) -> None:
-    task, n = found.task, len(found.plots.names)
-    stops = sum(len(visit.stops) for visit in found.visits)
-    how = f"{stops} stops" if task.speed is None else f"passes at {task.speed:g} m/s"
-    lines = len(found.visits[0].lines)
-    print_lines(None, [f"{found.plots.source}: {n} plots, {how}, {lines} lines a plot, track at {found.offset:g} m"])
+    from planner.field.scan_report import assumptions, day_line, headline, pass_lines
+
+    n = len(found.plots.names)
+    print_lines(None, [headline(found)])
     share = f"{found.coverage.min():.1%} to {found.coverage.max():.1%} of each plot seen"
-    print_lines(None, [f"{share}, each spot {found.overlap.mean():.1f} times; {found.seconds.sum() / 60:.0f} min over plots"])
+    print_lines(None, [f"{share}, each spot {found.overlap.mean():.1f} times", day_line(found)])
+    print_lines(None, pass_lines(found))
     listed = list(zip(found.plots.names, found.coverage, found.overlap, found.seconds, found.energy, strict=True))
     rows = [(name, f"{c:.1%}", f"{o:.1f}", f"{t:.1f} s", f"{e:.1f} J") for name, c, o, t, e in listed]
     print_rows(("plot", "seen", "times", "time", "work of joints"), rows if whole else rows[:_FEW])
@@ -326,7 +360,7 @@ def _print_scan(found: "Scan", whole: bool) -> None:
     print_lines(None, [f"{len(moves) - _FEW} more moves: --all lists them"] if len(moves) > _FEW and not whole else [])
     crossed = f"the track crosses {found.crossed} plots, so the vehicle must straddle them"
     print_lines("note", [crossed] if found.crossed else [])
-    print_lines("note", ["turns at the ends of rows, and shocks while driving, are not counted"])
+    print_lines("assumed", assumptions(found))
     print_lines("note", found.plots.notes if whole else [])
 
 
@@ -336,13 +370,24 @@ def _worst(move: "Move") -> float:
     return max((worst.ratio for worst in certificate.worst), default=0.0) if certificate is not None else 0.0
 
 
-def _scan_json(found: "Scan", columns: dict[str, list[Any]], written: dict[str, str]) -> dict[str, Any]:
+def _scan_json(found: "Scan", written: dict[str, str]) -> dict[str, Any]:
+    from planner.field.scan_report import assumptions, day_seconds, scan_columns
+
+    columns = scan_columns(found)
     plots = [{"plot": name, **{key: values[k] for key, values in columns.items()}} for k, name in enumerate(found.plots.names)]
     moves = [
         {"move": name, "duration_s": move.report.duration, "verdict": str(move.report.verdict), "worst_ratio": _worst(move)}
         for name, move in found.moves.items()
     ]
-    return {"offset_m": found.offset, "stops": len(found.track), "plots": plots, "moves": moves, "files": written}
+    options = [
+        {"passes": each.passes, "sweep_m": each.sweep, "largest_speed_m_s": float(each.speed), "limit": each.limit}
+        for each in found.options
+    ]
+    return {
+        "offset_m": found.offset, "stops": len(found.track), "passes": found.passes, "pass_options": options,
+        "day_s": {"total": found.duration, **day_seconds(found)}, "assumptions": assumptions(found),
+        "plots": plots, "moves": moves, "files": written,
+    }  # fmt: skip
 
 
 def _map_at(field: "PlotMap", tags: "SensorTags") -> "PlotMap":

@@ -24,9 +24,10 @@ from boom_model.arrays import Array
 from boom_model.kinematics.constraints import parse_constraint
 from planner.field.extra import library
 from planner.field.plots import PlotMap
+from planner.field.scan_day import Day, legs, mission_text
 from planner.field.scan_ground import DOWN, GroundLines, fastest_crossing, ground_lines, ground_move, mirrored
 from planner.field.scan_rows import Beside, Row, rows_of
-from planner.field.scan_task import Leg, PassOption, ScanTask, Visit
+from planner.field.scan_task import Leg, PassOption, ScanTask, Visit, first_line, ground_name, targets_of
 from planner.planning import Move, plan, torques
 from planner.progress import Track
 
@@ -57,6 +58,8 @@ class Scan:
     """(plots,) share of each plot that is seen"""
     overlap: Array
     """(plots,) area seen over that seen at least once"""
+    legs: tuple[Leg, ...]
+    """The vehicle's day, from the first row to the last."""
     seconds: Array
     """(plots,) of work over each plot: at its stops, or from edge to edge in every pass [s]"""
     energy: Array
@@ -69,13 +72,6 @@ class Scan:
             return 0
         return max(len(visit.ground) or len(visit.lines) for visit in self.visits)
 
-    @cached_property
-    def legs(self) -> tuple[Leg, ...]:
-        """The vehicle's day, from the first row to the last."""
-        from planner.field.scan_day import legs
-
-        return legs(self)
-
     @property
     def duration(self) -> float:
         """Of the day, without the way from the transport pose and back [s]."""
@@ -84,8 +80,6 @@ class Scan:
     @cached_property
     def mission(self) -> str:
         """The day as a mission file's text."""
-        from planner.field.scan_day import mission_text
-
         return mission_text(self)
 
     @cached_property
@@ -146,7 +140,14 @@ def plan_scan(boom: Boom, plots: PlotMap, task: ScanTask, track: Track = iter) -
     figures = np.array([seen[k] for k in range(len(beside))])
     order = np.argsort([each.plot for each in beside])
     coverage, overlap, seconds, energy = figures[order].T
-    return Scan(task, offset, plots, rows, beside, tuple(visits), moves, options, coverage, overlap, seconds, energy)
+
+    def planned(start: str, goal: str) -> str:
+        _planned(boom, start, goal, task, moves)
+        return f"{start} to {goal}"
+
+    by_plot = {each.plot: visit for each, visit in zip(beside, visits, strict=True)}
+    day = legs(Day(task, offset, rows, by_plot, moves, planned))
+    return Scan(task, offset, plots, rows, beside, tuple(visits), moves, options, coverage, overlap, day, seconds, energy)
 
 
 def _check(task: ScanTask) -> None:
@@ -301,16 +302,6 @@ def _visit(boom: Boom, plot: Beside, offset: float, task: ScanTask) -> Visit:
     return Visit((), (), 0.0, reason or "the tip has no room along the row")
 
 
-def targets_of(visit: Visit, task: ScanTask) -> tuple[str, ...]:
-    """Return the targets of the tip over one stop, to and fro from line to line; or in every pass."""
-    targets = []
-    for number, y in enumerate(visit.lines):
-        half = visit.half
-        ends = (-half, half) if number % 2 == 0 else (half, -half)
-        targets += [f"tip={x + 0.0:.4f},{y:.4f},{task.tip_height:.4f}" for x in (ends if half > 0.0 else (0.0,))]
-    return tuple(targets)
-
-
 def _looked(
     boom: Boom, plot: Beside, visit: Visit, offset: float, task: ScanTask, moves: dict[str, Move]
 ) -> tuple[float, float, float, float]:
@@ -345,13 +336,11 @@ def _looked(
 def _planned(boom: Boom, start: str, goal: str, task: ScanTask, moves: dict[str, Move]) -> Move:
     name = f"{start} to {goal}"
     if name not in moves:
-        moves[name] = plan(boom, start, goal, along="line", profile=task.profile, constraint=task.constraint)
+        try:
+            moves[name] = plan(boom, start, goal, along="line", profile=task.profile, constraint=task.constraint)
+        except InfeasibleError:  # a line from row to row may lead past the mount
+            moves[name] = plan(boom, start, goal, profile=task.profile, constraint=task.constraint)
     return moves[name]
-
-
-def ground_name(number: int, side: int) -> str:
-    """Return the words of a move over the ground, of a pass from 0 on, from the near (0) or the far (1) edge."""
-    return f"lines across, pass {number + 1}, from the {'far' if side else 'near'} edge"
 
 
 def _ground_looks(boom: Boom, plot: Beside, visit: Visit, task: ScanTask, moves: dict[str, Move]) -> tuple[list[Array], float]:
@@ -362,9 +351,9 @@ def _ground_looks(boom: Boom, plot: Beside, visit: Visit, task: ScanTask, moves:
         crossing = both[0].crossing
         for side, each in enumerate(both):
             moves[ground_name(number, side)] = ground_move(boom, each, speed)
-            _planned(boom, *each.forward, task, moves)
+            _planned(boom, *each.crossing.forward, task, moves)
         move = moves[ground_name(number, 0)]
-        energy += _work(boom, move) + _work(boom, moves[" to ".join(both[0].forward)])
+        energy += _work(boom, move) + _work(boom, moves[" to ".join(both[0].crossing.forward)])
         begin = first_line(plot, crossing.lines, task) + crossing.begin
         for phase in range(_PHASES):
             t = (np.arange(int(move.report.duration * task.rate)) + phase / _PHASES) / task.rate
@@ -373,11 +362,6 @@ def _ground_looks(boom: Boom, plot: Beside, visit: Visit, task: ScanTask, moves:
             travelled = np.stack([begin + speed * move.trajectory.t[at], np.zeros(len(at))], axis=-1)
             looks[phase].append(marks + travelled[:, None, :])
     return [np.concatenate(each) for each in looks], energy
-
-
-def first_line(plot: Beside, lines: int, task: ScanTask) -> float:
-    """Return where the first line across a plot is, along the row from its middle [m]."""
-    return plot.x[0] + 0.5 * task.footprint[1] if lines > 1 else 0.5 * (plot.x[0] + plot.x[1])
 
 
 def _shots(move: Move, task: ScanTask) -> Array:

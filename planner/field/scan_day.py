@@ -1,112 +1,118 @@
 """The day of a row scan: the vehicle's drives and turns, and the boom's moves, in time; and the same as a mission."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import groupby, pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from boom_model.arrays import Array
-from planner.field.scan import Scan, first_line, ground_name, targets_of
 from planner.field.scan_rows import Beside, Row, length, turn
-from planner.field.scan_task import Leg, Visit
+from planner.field.scan_task import Leg, ScanTask, Visit, first_line, ground_name, targets_of
 from planner.planning import Move
+
+if TYPE_CHECKING:
+    from planner.field.scan import Scan
 
 _SHORTEST = 0.01  # [s] of a mission's hold
 _DIGITS = 9
 _KNOTS = 0.05  # [s] between samples of a motion in a mission file
 
 Work = list[tuple[Beside, Visit]]
+Planned = Callable[[str, str], str]
+"""Plans the tip's move between two targets where there is none yet, and returns its words."""
 
 
-def legs(scan: Scan) -> tuple[Leg, ...]:
+@dataclass(frozen=True, eq=False)
+class Day:
+    """What the legs of a day are made from."""
+
+    task: ScanTask
+    offset: float
+    rows: tuple[Row, ...]
+    visits: dict[int, Visit]
+    """By plot."""
+    moves: dict[str, Move]
+    planned: Planned
+
+
+def legs(day: Day) -> tuple[Leg, ...]:
     """Return the vehicle's day, row by row, with a turn between two of them."""
     found: list[Leg] = []
     here = ""
-    for row in scan.rows:
-        work = [(b, v) for b, v in zip(scan.beside, scan.visits, strict=True) if b.row == row.number and v.lines]
+    for row in day.rows:
+        work = [(each, day.visits[each.plot]) for each in row.plots if day.visits[each.plot].lines]
         if not work:
             continue
-        mine = list(_stops(scan, row, work, here) if scan.task.speed is None else _drives(scan, row, work, here))
+        if day.task.speed is None:
+            mine = list(_stops(day, row, work, here))
+        elif all(visit.ground for _, visit in work):
+            mine = list(_over_ground(day, row, work, here))
+        else:
+            mine = list(_beside(day, row, work, here))
         if found:
-            way = turn(found[-1].way[-1], _ahead(found[-1]), mine[0].way[0], scan.task.turn_radius)
-            found.append(Leg("turn", length(way) / scan.task.drive_speed, way, None, held=here))
+            ahead = found[-1].ahead
+            assert ahead is not None, "a row's last leg looks along the row"
+            way = turn(found[-1].way[-1], ahead, mine[0].way[0], day.task.turn_radius)
+            found.append(_driven(day, "turn", way, None, here, mine[0].start))
         found += mine
-        here = _last(mine)
+        here = mine[-1].goal
     return tuple(found)
 
 
-def _ahead(leg: Leg) -> Array:
-    return leg.ahead if leg.ahead is not None else np.array([1.0, 0.0])
+def _driven(day: Day, what: str, way: Array, ahead: Array | None, here: str, goal: str, speed: float | None = None) -> Leg:
+    """Return a drive during which the tip goes from one target to another; it lasts as long as the longer of the two."""
+    moves = (day.planned(here, goal),) if here != goal else ()
+    seconds = sum(day.moves[name].report.duration for name in moves)
+    return Leg(what, max(length(way) / (speed or day.task.drive_speed), seconds), way, ahead, moves, here, goal)
 
 
-def _last(found: list[Leg]) -> str:
-    return found[-1].moves[-1].split(" to ")[-1] if found[-1].moves else found[-1].held
-
-
-def _stops(scan: Scan, row: Row, work: Work, here: str) -> Iterator[Leg]:
+def _stops(day: Day, row: Row, work: Work, here: str) -> Iterator[Leg]:
     last = None
     for each, visit in work:
-        targets = targets_of(visit, scan.task)
+        targets = targets_of(visit, day.task)
         for stop in visit.stops:
-            place = row.at(each.along + stop, scan.offset)[None]
-            if last is not None:
-                way = np.vstack([last, place])
-                yield Leg("drive", length(way) / scan.task.drive_speed, way, row.ahead, held=here)
+            place = row.at(each.along + stop, day.offset)[None]
             order = targets[::-1] if here == targets[-1] else targets
+            if last is not None:
+                yield _driven(day, "drive", np.vstack([last, place]), row.ahead, here, order[0])
             moves = tuple(f"{a} to {b}" for a, b in pairwise(order))
-            seconds = max(sum(scan.moves[name].report.duration for name in moves), 1.0 / scan.task.rate)
-            yield Leg("stop", seconds, place, row.ahead, moves, held=order[0], plot=each.plot)
+            seconds = max(sum(day.moves[name].report.duration for name in moves), 1.0 / day.task.rate)
+            yield Leg("stop", seconds, place, row.ahead, moves, order[0], order[-1], each.plot)
             last, here = place, order[-1]
 
 
-def _drives(scan: Scan, row: Row, work: Work, here: str) -> Iterator[Leg]:
-    if work[0][1].ground:
-        yield from _over_ground(scan, row, work)
-        return
-    speed = scan.task.speed or 1.0
-    ends = np.array([row.at(x, scan.offset) for x in row.span])
-    seconds = length(ends) / speed
-    targets = targets_of(max((visit for _, visit in work), key=lambda visit: len(visit.lines)), scan.task)
+def _beside(day: Day, row: Row, work: Work, here: str) -> Iterator[Leg]:
+    speed = day.task.speed or 1.0
+    ends = np.array([row.at(x, day.offset) for x in row.span])
+    targets = targets_of(max((visit for _, visit in work), key=lambda visit: len(visit.lines)), day.task)
     order = targets[::-1] if here == targets[-1] else targets
     for number, target in enumerate(order):
         if number:
-            name = f"{order[number - 1]} to {target}"
-            back = max(length(ends) / scan.task.drive_speed, scan.moves[name].report.duration)
-            yield Leg("back", back, ends[::-1], row.ahead, (name,), held=order[number - 1])
-        yield Leg("pass", seconds, ends, row.ahead, held=target)
+            yield _driven(day, "back", ends[::-1], row.ahead, order[number - 1], target)
+        yield Leg("pass", length(ends) / speed, ends, row.ahead, (), target, target)
 
 
-def _over_ground(scan: Scan, row: Row, work: Work) -> Iterator[Leg]:
-    speed = scan.task.speed or 1.0
+def _over_ground(day: Day, row: Row, work: Work, here: str) -> Iterator[Leg]:
+    speed = day.task.speed or 1.0
     last = None
+    side = next((k for k, lines in enumerate(work[0][1].ground[0]) if lines.crossing.targets[0] == here), 0)
     for number in range(len(work[0][1].ground)):
-        side = 0
         for position, (each, visit) in enumerate(work):
-            crossing = visit.ground[number][0].crossing
-            begin = each.along + first_line(each, crossing.lines, scan.task) + crossing.begin
-            ends = np.array([row.at(begin + x, scan.offset) for x in (0.0, crossing.travel)])
-            name, forward = ground_name(number, side), " to ".join(visit.ground[number][side].forward)
-            if position == 0 and last is not None:
-                way = np.vstack([last, ends[:1]])
-                yield Leg("back", length(way) / scan.task.drive_speed, way, row.ahead, (), held=_held(scan, name))
-            yield Leg(
-                "pass", scan.moves[name].report.duration, ends, row.ahead, (name,), held=_held(scan, name), plot=each.plot
-            )
-            last = ends[1:]
-            if position + 1 < len(work):
-                after, then = work[position + 1]
-                following = then.ground[number][0].crossing
-                goal = row.at(after.along + first_line(after, following.lines, scan.task) + following.begin, scan.offset)
-                way = np.vstack([last, goal[None]])
-                yield Leg("drive", length(way) / speed, way, row.ahead, (forward,), held=forward.split(" to ")[0])
-            side = (side + crossing.lines) % 2
+            crossing = visit.ground[number][side % len(visit.ground[number])].crossing
+            begin = each.along + first_line(each, crossing.lines, day.task) + crossing.begin
+            ends = np.array([row.at(begin + x, day.offset) for x in (0.0, crossing.travel)])
+            start, goal = crossing.targets
+            if last is not None:
+                way, what = np.vstack([last, ends[:1]]), "drive" if position else "back"
+                yield _driven(day, what, way, row.ahead, here, start, speed if position else None)
+            name = ground_name(number, side % len(visit.ground[number]))
+            yield Leg("pass", day.moves[name].report.duration, ends, row.ahead, (name,), start, goal, each.plot)
+            last, here, side = ends[1:], goal, (side + crossing.lines) % 2
 
 
-def _held(scan: Scan, name: str) -> str:
-    return f"begin of {name}"
-
-
-def mission_text(scan: Scan) -> str:
+def mission_text(scan: "Scan") -> str:
     """Return the day as a mission: from and to transport, with what is alike put together.
 
     The boom holds still while the vehicle drives and turns. All of that time is spread evenly over
@@ -126,7 +132,7 @@ def mission_text(scan: Scan) -> str:
     return "\n".join([*lines, *body, *_step(scan, "transport", line=False)]) + "\n"
 
 
-def _line_steps(scan: Scan) -> list[str]:
+def _line_steps(scan: "Scan") -> list[str]:
     """Return the steps of stops, or of passes of a boom that stands still."""
     task = scan.task
     stopped = task.speed is None
@@ -151,7 +157,7 @@ def _line_steps(scan: Scan) -> list[str]:
     return lines
 
 
-def _blocks(scan: Scan) -> list[tuple[str, ...]]:
+def _blocks(scan: "Scan") -> list[tuple[str, ...]]:
     """Return the targets of every stop, or of every row of passes."""
     found = []
     for _, group in groupby(zip(scan.beside, scan.visits, strict=True), lambda pair: pair[0].row):
@@ -165,7 +171,7 @@ def _blocks(scan: Scan) -> list[tuple[str, ...]]:
     return found
 
 
-def _sweep(scan: Scan, targets: tuple[str, ...], hold: str) -> list[str]:
+def _sweep(scan: "Scan", targets: tuple[str, ...], hold: str) -> list[str]:
     """Return the steps from the first target on: holding after the last, or, driving past, at each."""
     held = ["", "[[steps]]", f"hold_s = {hold}"]
     if scan.task.speed is None:
@@ -173,12 +179,14 @@ def _sweep(scan: Scan, targets: tuple[str, ...], hold: str) -> list[str]:
     return held + [line for target in targets[1:] for line in (*_step(scan, target, line=True), *held)]
 
 
-def _ground_steps(scan: Scan) -> list[str]:
+def _ground_steps(scan: "Scan") -> list[str]:
     """Return the steps of lines over the ground: each move as samples, the way forward, and a hold."""
     passed = [leg for leg in scan.legs if leg.what == "pass"]
     visit = next(visit for visit in scan.visits if visit.ground)
     forward = {
-        ground_name(n, k): " to ".join(each.forward) for n, sides in enumerate(visit.ground) for k, each in enumerate(sides)
+        ground_name(n, k): " to ".join(each.crossing.forward)
+        for n, sides in enumerate(visit.ground)
+        for k, each in enumerate(sides)
     }
     moved = sum(scan.moves[name].report.duration for leg in passed for name in (leg.moves[0], forward[leg.moves[0]]))
     hold = f"{max((scan.duration - moved) / max(len(passed), 1), _SHORTEST):.4f}"
@@ -189,7 +197,7 @@ def _ground_steps(scan: Scan) -> list[str]:
         each = [
             [
                 *("", "[[steps]]", f"motion = {_samples(scan.moves[name])}"),
-                *_step(scan, side.forward[1], line=True),
+                *_step(scan, side.crossing.forward[1], line=True),
                 *("", "[[steps]]", f"hold_s = {hold}"),
             ]
             for name, side in zip(names, sides, strict=True)
@@ -217,7 +225,7 @@ def _samples(move: Move) -> str:
     return "[\n" + "".join(f"  [{', '.join(f'{x:.{_DIGITS}f}' for x in row)}],\n" for row in rows) + "]"
 
 
-def _step(scan: Scan, target: str, *, line: bool) -> list[str]:
+def _step(scan: "Scan", target: str, *, line: bool) -> list[str]:
     return ["", "[[steps]]", f'to = "{target}"', f'profile = "{scan.task.profile}"', *(['along = "line"'] if line else [])]
 
 

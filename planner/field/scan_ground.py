@@ -25,8 +25,9 @@ from boom_model.arrays import Array
 from boom_model.kinematics.constraints import Constraint, parse_constraint
 from planner.motion.planned import PlannedMotion
 from planner.motion.trajectory import STEP
+from planner.move_spec import MoveSpec
 from planner.paths.tip_path import TipPath, follow
-from planner.planning import Move, check_motion, plan
+from planner.planning import Move, check_motion, plan_motion
 from planner.timing.path_limits import jerk_stretch, least_stretch
 from planner.timing.time_law import Motion, TimeLaw
 
@@ -128,6 +129,16 @@ class Crossing:
         """Where the tip is at the end, beside the track."""
         return self.y[self.lines % 2]
 
+    @property
+    def targets(self) -> tuple[str, str]:
+        """The targets of the tip at the start and at the end."""
+        return _target(0.5 * self.back, self.y[0], self.height), self.forward[0]
+
+    @property
+    def forward(self) -> tuple[str, str]:
+        """The targets of the tip where it has fallen back, and where it sets out for the next plot."""
+        return _target(-0.5 * self.back, self.end_y, self.height), _target(0.5 * self.back, self.end_y, self.height)
+
     def pieces(self) -> tuple[GroundPiece, ...]:
         """Return the curve, piece by piece."""
         return tuple(self._pieces())
@@ -157,12 +168,6 @@ class GroundLines:
     limit: str
     """What limits it."""
 
-    @property
-    def forward(self) -> tuple[str, str]:
-        """The targets of the tip where it has fallen back, and where it sets out for the next plot."""
-        c = self.crossing
-        return _target(-0.5 * c.back, c.end_y, c.height), _target(0.5 * c.back, c.end_y, c.height)
-
 
 def fastest_crossing(
     boom: Boom, y: tuple[float, float], lines: int, spacing: float, period: float, height: float, constraint: str, profile: str
@@ -191,7 +196,8 @@ def fastest_crossing(
             pieces = crossing.pieces()
             some = (*pieces[:3], pieces[2 * (lines // 2) - 1], pieces[-2])
             try:
-                tried.append((min(_speed(boom, piece, rule, profile) for piece in dict.fromkeys(some)), crossing))
+                over = min(_speed(boom, piece, rule, profile) for piece in dict.fromkeys(some))
+                tried.append((min(over, _between(boom, crossing, constraint, profile)), crossing))
             except InfeasibleError:
                 continue
     return max(tried, key=lambda pair: pair[0], default=None)
@@ -205,12 +211,10 @@ def ground_lines(boom: Boom, crossing: Crossing, constraint: str, profile: str) 
     """
     pieces = crossing.pieces()
     paths = _paths(boom, pieces, parse_constraint(constraint))
-    found = GroundLines(crossing, paths, profile, 0.0, "")
-    forward = plan(boom, *found.forward, along="line", profile=profile, constraint=constraint).report.duration
     over = min(piece.travel / _least(boom, path, profile, _LOOKS) for path, piece in zip(paths, pieces, strict=True))
-    between = (crossing.period - crossing.travel) / forward
+    between = _between(boom, crossing, constraint, profile)
     limit = "the lines over the plot" if over < between else "the way forward between plots"
-    return replace(found, speed=min(over, between), limit=limit)
+    return GroundLines(crossing, paths, profile, min(over, between), limit)
 
 
 def mirrored(boom: Boom, found: GroundLines, constraint: str) -> GroundLines:
@@ -234,6 +238,12 @@ def ground_move(boom: Boom, found: GroundLines, speed: float) -> Move:
 def _speed(boom: Boom, piece: GroundPiece, rule: Constraint, profile: str) -> float:
     (path,) = _paths(boom, (piece,), rule)
     return piece.travel / _least(boom, path, profile, _FEW_LOOKS)
+
+
+def _between(boom: Boom, crossing: Crossing, constraint: str, profile: str) -> float:
+    """Return the speed at which the vehicle is at the next plot when the tip has come forward [m/s]."""
+    forward = plan_motion(boom, MoveSpec.of(*crossing.forward, along="line", profile=profile, constraint=constraint))
+    return (crossing.period - crossing.travel) / forward.duration
 
 
 def _paths(boom: Boom, pieces: tuple[GroundPiece, ...], rule: Constraint) -> tuple[TipPath, ...]:

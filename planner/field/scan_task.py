@@ -7,6 +7,7 @@ import numpy as np
 
 from boom_model.arrays import Array
 from planner.field.scan_ground import GroundLines
+from planner.field.scan_rows import Beside
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,10 @@ class Leg:
     """(2,) where the vehicle looks; None is along the way"""
     moves: tuple[str, ...] = ()
     """Of the boom, one after the other from the leg's begin; then it holds still."""
-    held: str = ""
-    """The tip's target where the boom does not move."""
+    start: str = ""
+    """The tip's target at the begin."""
+    goal: str = ""
+    """The tip's target at the end."""
     plot: int = -1
 
     def mount(self, t: Array) -> tuple[Array, Array]:
@@ -96,3 +99,23 @@ class Leg:
         piece = np.clip(np.searchsorted(at, along, side="right") - 1, 0, len(steps) - 1)
         directions = np.diff(self.way, axis=0) / np.maximum(steps, 1e-12)[:, None]
         return places, directions[piece]
+
+
+def targets_of(visit: Visit, task: ScanTask) -> tuple[str, ...]:
+    """Return the targets of the tip over one stop, to and fro from line to line; or in every pass."""
+    targets = []
+    for number, y in enumerate(visit.lines):
+        half = visit.half
+        ends = (-half, half) if number % 2 == 0 else (half, -half)
+        targets += [f"tip={x + 0.0:.4f},{y:.4f},{task.tip_height:.4f}" for x in (ends if half > 0.0 else (0.0,))]
+    return tuple(targets)
+
+
+def ground_name(number: int, side: int) -> str:
+    """Return the words of a move over the ground, of a pass from 0 on, from the near (0) or the far (1) edge."""
+    return f"lines across, pass {number + 1}, from the {'far' if side else 'near'} edge"
+
+
+def first_line(plot: Beside, lines: int, task: ScanTask) -> float:
+    """Return where the first line across a plot is, along the row from its middle [m]."""
+    return plot.x[0] + 0.5 * task.footprint[1] if lines > 1 else 0.5 * (plot.x[0] + plot.x[1])
