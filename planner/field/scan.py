@@ -182,6 +182,12 @@ def _lines(y: tuple[float, float], task: ScanTask) -> Array:
     return _spread(*y, task.footprint[0], task.overlap)
 
 
+def lines_of(row: Row, task: ScanTask) -> Array:
+    """Return where the middles of a row's lines are, to the left of its middle [m]."""
+    low, high = min(plot.y[0] for plot in row.plots), max(plot.y[1] for plot in row.plots)
+    return _lines((low, high), task)
+
+
 def _strips(y: tuple[float, float], task: ScanTask, passes: int) -> list[tuple[float, float]]:
     """Return from where to where the tip goes across a plot in every pass [m]; the strips overlap as lines do."""
     side = task.footprint[0]
