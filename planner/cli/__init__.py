@@ -25,6 +25,7 @@ from planner.cli import (
     moves,
     page,
     require,
+    scan,
     study,
     view,
 )
@@ -113,7 +114,7 @@ for _command in (
     control.control,
     field.geotag,
     field.plots,
-    field.scan,
+    scan.scan,
     link.link,
     files.export,
     files.export_model,

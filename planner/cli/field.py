@@ -1,4 +1,4 @@
-"""In the field: geotags of a sensor's measurements, plot maps, row scans."""
+"""In the field: geotags of a sensor's measurements, plot maps."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -6,37 +6,25 @@ import click
 import numpy as np
 
 from boom_model import InputError
-from boom_model.plausible import OFFSET, RATE, Range
-from planner.cli.completion import OneOf, OutFile
+from boom_model.plausible import Range
+from planner.cli.completion import OutFile
 from planner.cli.options import (
     all_option,
     boom_option,
-    constraint_option,
     json_option,
     load_boom,
     outputs,
     payload_option,
     plausible,
-    with_names,
 )
-from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows, tracked
+from planner.cli.printing import print_files, print_json, print_lines, print_rows
 
 if TYPE_CHECKING:
-    from boom_model import Boom
     from planner.field.plots import Located, PlotMap
-    from planner.field.scan import Scan
     from planner.field.sensor_tags import SensorTags
-    from planner.files import Outputs
-    from planner.planning import Move
 
 _EPSG = Range(1024, 999_999, "")
 _GAP = Range(1e-3, 1e4, "s")
-_SIDE = Range(0.01, 100.0, "m")
-_BESIDE = Range(0.1, 30.0, "m")
-_SHARE = Range(0.0, 0.9, "")
-_PACE = Range(0.01, 10.0, "m/s")
-_RADIUS = Range(0.1, 100.0, "m")
-_PROFILES = ("cubic", "quintic", "trapezoidal", "jerk-limited", "time-optimal")
 _SURE = 0.95
 _FEW = 3
 
@@ -184,210 +172,6 @@ def plots(
     print_files(written)
     print_lines("next", [] if out else [f"boom plots {source} --out plots.geojson --picture plots.png"])
     return 0
-
-
-@click.command()
-@click.argument("source", metavar="MAP")
-@click.option("--footprint", required=True, metavar="M,M", help="What the sensor sees: along the arm, across it.")
-@click.option(
-    "--rate", type=float, default=4.0, show_default=True, callback=plausible(RATE), metavar="HZ", help="Of the sensor."
-)
-@click.option(
-    "--tip-height",
-    type=float,
-    default=0.9,
-    show_default=True,
-    callback=plausible(OFFSET),
-    metavar="M",
-    help="Of the tip over the mount: canopy and distance, less the mount's height.",
-)
-@click.option(
-    "--offset",
-    type=float,
-    callback=plausible(_BESIDE),
-    metavar="M",
-    help="From the track to the middle of a row; default: where the fewest stops do.",
-)
-@click.option(
-    "--overlap",
-    type=float,
-    default=0.1,
-    show_default=True,
-    callback=plausible(_SHARE),
-    metavar="SHARE",
-    help="Of two lines beside each other.",
-)
-@click.option("--speed", type=float, callback=plausible(_PACE), metavar="M/S", help="Drive past the plots; default: stop.")
-@click.option(
-    "--passes",
-    type=click.IntRange(1, 99),
-    metavar="N",
-    help="Along each row at that speed; default: the fewest that the boom can follow.",
-)
-@click.option(
-    "--drive-speed",
-    type=float,
-    default=1.0,
-    show_default=True,
-    callback=plausible(_PACE),
-    metavar="M/S",
-    help="From stop to stop, back along a row, and in turns.",
-)
-@click.option(
-    "--turn-radius",
-    type=float,
-    default=4.0,
-    show_default=True,
-    callback=plausible(_RADIUS),
-    metavar="M",
-    help="Of the vehicle's turns between rows (assumed).",
-)
-@click.option("--profile", type=OneOf(_PROFILES), default="jerk-limited", show_default=True, help="How the moves are timed.")
-@constraint_option
-@click.option("--mission", type=OutFile(".toml"), metavar="FILE.toml", help="The scan as a mission, for boom mission and size.")
-@click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="The plots with their coverage.")
-@click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Plots, coverage and track.")
-@click.option("--recording", type=OutFile(".rrd"), metavar="FILE.rrd", help="The day in 3D, beside a map.")
-@click.option("--report", "document", type=OutFile(".md", ".html", ".pdf"), metavar="FILE", help="Write .md, .html or .pdf.")
-@payload_option
-@_epsg_option
-@boom_option
-@all_option
-@json_option
-def scan(
-    source: str,
-    footprint: str,
-    mission: str | None,
-    out: str | None,
-    picture: str | None,
-    recording: str | None,
-    document: str | None,
-    payload: float | None,
-    epsg: int | None,
-    boom_file: str | None,
-    whole: bool,
-    as_json: bool,
-    **figures: Any,
-) -> int:
-    """Plan a row scan: where the vehicle stops or passes, the boom's moves, and the coverage of each plot.
-
-    \b
-    Examples:
-      boom scan trial.toml --footprint 0.5,0.5 --mission scan.toml --picture scan.png
-      boom scan trial.toml --footprint 0.5,0.5 --speed 0.5 --recording scan.rrd --report scan.pdf
-    """
-    from boom_model.words import numbers
-    from planner.field.plot_files import read_plots
-    from planner.field.scan import plan_scan
-    from planner.field.scan_task import ScanTask
-
-    files = outputs(mission, out, picture, recording, document=document, inputs=(source, boom_file))
-    along, across = numbers(footprint, footprint, 2)
-    _SIDE.require("footprint", (along, across))
-    boom, field = load_boom(boom_file, payload), read_plots(source, epsg)
-    found = plan_scan(boom, field, ScanTask((along, across), **figures), tracked("planning"))
-    names = {"mission": mission, "plots": out, "picture": picture, "recording": recording, "report": document}
-    written = with_names(names)
-    failed = _failed(found)
-    with files:
-        _write_scan(files, boom, found, written, failed)
-    if as_json:
-        print_json(_scan_json(found, written))
-    else:
-        _print_scan(found, whole)
-        print_files(written)
-        then = f"boom mission {mission}" if mission else f"boom scan {source} --footprint {footprint} --mission scan.toml"
-        print_lines("next", [then])
-    if failed:
-        complain(failed)
-    return ANSWER_IS_NO if failed else 0
-
-
-def _write_scan(files: "Outputs", boom: "Boom", found: "Scan", written: dict[str, str], failed: str) -> None:
-    """Write the files of a scan by kind."""
-    from planner.field.plot_files import write_plots
-    from planner.field.plot_picture import map_figure, write_picture
-    from planner.field.scan_report import scan_columns, scan_report
-    from planner.reports.document import write_document
-
-    place = {kind: files.temporary(name) for kind, name in written.items()}
-    look = {"coverage": found.coverage, "track": found.track}
-    if "mission" in place:
-        with open(place["mission"], "w", encoding="utf-8") as file:
-            file.write(found.mission)
-    if "plots" in place:
-        write_plots(found.plots, place["plots"], scan_columns(found))
-    if "picture" in place:
-        write_picture(place["picture"], found.plots, **look)
-    if "recording" in place:
-        from planner.recording.scan import write_scan_recording  # slow to import
-
-        write_scan_recording(place["recording"], boom, found)
-    if "report" in place:
-        write_document(place["report"], scan_report(found, failed), {"The field": map_figure(found.plots, **look)})
-
-
-def _failed(found: "Scan") -> str:
-    """Why the answer is no: a move's check fails, or a plot is not reached; else nothing."""
-    from planner.checks.rows import Verdict
-
-    bad = [name for name, move in found.moves.items() if move.report.verdict is Verdict.FAIL]
-    lost = found.unreachable
-    reason = next(iter(lost.values()), "")
-    said = [f"{len(bad)} moves FAIL, the first {bad[0]}"] if bad else []
-    return "; ".join(
-        said + ([f"{len(lost)} of {len(found.plots.names)} plots are not reached whole: {reason}"] if lost else [])
-    )
-
-
-def _print_scan(found: "Scan", whole: bool) -> None:
-    from planner.field.scan_report import assumptions, day_line, headline, pass_lines
-
-    n = len(found.plots.names)
-    print_lines(None, [headline(found)])
-    share = f"{found.coverage.min():.1%} to {found.coverage.max():.1%} of each plot seen"
-    print_lines(None, [f"{share}, each spot {found.overlap.mean():.1f} times", day_line(found)])
-    print_lines(None, pass_lines(found))
-    listed = list(zip(found.plots.names, found.coverage, found.overlap, found.seconds, found.energy, strict=True))
-    rows = [(name, f"{c:.1%}", f"{o:.1f}", f"{t:.1f} s", f"{e:.1f} J") for name, c, o, t, e in listed]
-    print_rows(("plot", "seen", "times", "time", "work of joints"), rows if whole else rows[:_FEW])
-    print_lines(None, [f"{n - _FEW} more plots: --all lists them"] if n > _FEW and not whole else [])
-    moves = [
-        (name.replace("tip=", ""), f"{move.report.duration:.2f} s", str(move.report.verdict), f"{_worst(move):.3f}")
-        for name, move in found.moves.items()
-    ]
-    print_rows(("move", "time", "verdict", "worst ratio"), moves if whole else moves[:_FEW])
-    print_lines(None, [f"{len(moves) - _FEW} more moves: --all lists them"] if len(moves) > _FEW and not whole else [])
-    crossed = f"the track crosses {found.crossed} plots, so the vehicle must straddle them"
-    print_lines("note", [crossed] if found.crossed else [])
-    print_lines("assumed", assumptions(found))
-    print_lines("note", found.plots.notes if whole else [])
-
-
-def _worst(move: "Move") -> float:
-    """Return the largest demand over limit of a move's certificate."""
-    certificate = move.report.certificate
-    return max((worst.ratio for worst in certificate.worst), default=0.0) if certificate is not None else 0.0
-
-
-def _scan_json(found: "Scan", written: dict[str, str]) -> dict[str, Any]:
-    from planner.field.scan_report import assumptions, day_seconds, scan_columns
-
-    columns = scan_columns(found)
-    plots = [{"plot": name, **{key: values[k] for key, values in columns.items()}} for k, name in enumerate(found.plots.names)]
-    moves = [
-        {"move": name, "duration_s": move.report.duration, "verdict": str(move.report.verdict), "worst_ratio": _worst(move)}
-        for name, move in found.moves.items()
-    ]
-    options = [
-        {"passes": each.passes, "sweep_m": each.sweep, "largest_speed_m_s": float(each.speed), "limit": each.limit}
-        for each in found.options
-    ]
-    return {
-        "offset_m": found.offset, "stops": len(found.track), "passes": found.passes, "pass_options": options,
-        "day_s": {"total": found.duration, **day_seconds(found)}, "assumptions": assumptions(found),
-        "plots": plots, "moves": moves, "files": written,
-    }  # fmt: skip
 
 
 def _map_at(field: "PlotMap", tags: "SensorTags") -> "PlotMap":

@@ -267,7 +267,8 @@ def _pass(boom: Boom, task: ScanTask, row: Row, line: float, mount: MountMotion)
     try:
         path = follow(boom, curve, DOWN, parse_constraint(task.constraint), tolerance=_TOLERANCE)
     except InfeasibleError as error:
-        return Pass(row.number, beside, curve, None, None, f"the line {beside:.2f} m beside the mount: {error}", {})
+        why = str(error).partition(": ")[0]
+        return Pass(row.number, beside, curve, None, None, f"on the line {beside:.2f} m beside the mount, {why}", {})
     law = TimeLaw.from_pieces([mount.duration], [[1.0 / mount.duration], [0.0]], jerk_limited=True)
     motion = sample(Motion(path, law), STEP)
     base = mount.base(motion.t)
