@@ -204,6 +204,7 @@ def _failed(found: "Scan") -> str:
     lost = found.unreachable
     reason = next(iter(lost.values()), "")
     said = [f"{len(bad)} moves FAIL, the first {bad[0]}"] if bad else []
+    said += ["a drive cannot hold while the vehicle starts or stops"] if found.starting > 1.0 else []
     return "; ".join(
         said + ([f"{len(lost)} of {len(found.plots.names)} plots are not reached whole: {reason}"] if lost else [])
     )
@@ -254,7 +255,8 @@ def _scan_json(found: "Scan", written: dict[str, str]) -> dict[str, Any]:
     ]
     return {
         "offset_m": found.offset, "stops": len(found.track), "passes": found.passes, "pass_options": options,
-        "day_s": {"total": found.duration, **day_seconds(found)}, "assumptions": assumptions(found),
+        "starting_ratio": found.starting, "day_s": {"total": found.duration, **day_seconds(found)},
+        "assumptions": assumptions(found),
         "plots": plots, "moves": moves, "files": written,
     }  # fmt: skip
 

@@ -24,7 +24,7 @@ from boom_model.arrays import Array
 from boom_model.kinematics.constraints import parse_constraint
 from planner.field.extra import library
 from planner.field.plots import PlotMap
-from planner.field.scan_day import Day, legs, mission_text
+from planner.field.scan_day import Day, legs, mission_text, starting_ratio
 from planner.field.scan_ground import DOWN, GroundLines, fastest_crossing, ground_lines, ground_move, mirrored
 from planner.field.scan_rows import Beside, Row, rows_of
 from planner.field.scan_task import Leg, PassOption, ScanTask, Visit, first_line, ground_name, targets_of
@@ -64,6 +64,8 @@ class Scan:
     """(plots,) of work over each plot: at its stops, or from edge to edge in every pass [s]"""
     energy: Array
     """(plots,) work of the joints, without what they give back [J]"""
+    starting: float
+    """Largest demand over limit of a drive that holds while the vehicle starts, stops or turns."""
 
     @property
     def passes(self) -> int:
@@ -146,8 +148,12 @@ def plan_scan(boom: Boom, plots: PlotMap, task: ScanTask, track: Track = iter) -
         return f"{start} to {goal}"
 
     by_plot = {each.plot: visit for each, visit in zip(beside, visits, strict=True)}
-    day = legs(Day(task, offset, rows, by_plot, moves, planned))
-    return Scan(task, offset, plots, rows, beside, tuple(visits), moves, options, coverage, overlap, day, seconds, energy)
+    parts = Day(task, offset, rows, by_plot, moves, planned)
+    day = legs(parts)
+    starting = starting_ratio(boom, parts, day)
+    return Scan(
+        task, offset, plots, rows, beside, tuple(visits), moves, options, coverage, overlap, day, seconds, energy, starting
+    )  # fmt: skip
 
 
 def _check(task: ScanTask) -> None:

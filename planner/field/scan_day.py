@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from boom_model import BaseMotion, Boom, inverse_dynamics
 from boom_model.arrays import Array
 from planner.field.scan_rows import Beside, Row, length, turn
 from planner.field.scan_task import Leg, ScanTask, Visit, first_line, ground_name, targets_of
-from planner.planning import Move
+from planner.planning import Move, plan
+from planner.timing.path_limits import load_ratio
 
 if TYPE_CHECKING:
     from planner.field.scan import Scan
 
+STARTS = 1.0
+"""Assumed acceleration of a vehicle that starts, stops or turns [m/s^2]."""
 _SHORTEST = 0.01  # [s] of a mission's hold
 _DIGITS = 9
 _KNOTS = 0.05  # [s] between samples of a motion in a mission file
@@ -110,6 +114,31 @@ def _over_ground(day: Day, row: Row, work: Work, here: str) -> Iterator[Leg]:
             name = ground_name(number, side % len(visit.ground[number]))
             yield Leg("pass", day.moves[name].report.duration, ends, row.ahead, (name,), start, goal, each.plot)
             last, here, side = ends[1:], goal, (side + crossing.lines) % 2
+
+
+def held(boom: Boom, task: ScanTask, moves: dict[str, Move], leg: Leg) -> Array:
+    """Return the joint position (5,) at a leg's begin."""
+    for name, move in moves.items():
+        start, _, goal = name.partition(" to ")
+        if leg.start in (start, goal):
+            position: Array = move.trajectory.q[-1 if leg.start == goal else 0]
+            return position
+    return np.asarray(plan(boom, leg.start, leg.start, constraint=task.constraint).trajectory.q[0])
+
+
+def starting_ratio(boom: Boom, day: Day, found: tuple[Leg, ...]) -> float:
+    """Return the largest demand over limit of a drive that holds while the vehicle starts, stops or turns.
+
+    The mount accelerates by STARTS ahead, back or to either side, at every position from which the
+    vehicle drives.
+    """
+    first = {leg.start: leg for leg in found}
+    q = np.repeat([held(boom, day.task, day.moves, leg) for leg in first.values()], 4, axis=0)
+    ways = STARTS * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+    still = np.zeros_like(q)
+    base = BaseMotion.of(acceleration=np.tile(ways, (len(first), 1)))
+    tau = inverse_dynamics(boom, q, still, still, base=base, reactions=False).tau
+    return float(load_ratio(boom, tau, still, still).max())
 
 
 def mission_text(scan: "Scan") -> str:

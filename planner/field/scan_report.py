@@ -3,6 +3,7 @@
 from typing import Any
 
 from planner.field.scan import Scan
+from planner.field.scan_day import STARTS
 from planner.reports.markdown import section, table
 
 _KINDS = {"stop": "at stops", "pass": "past plots", "drive": "between", "back": "back", "turn": "in turns"}
@@ -57,7 +58,8 @@ def assumptions(scan: Scan) -> list[str]:
     """Return what is assumed of the vehicle."""
     task = scan.task
     speeds = f"{task.turn_radius:g} m turns at {task.drive_speed:g} m/s"
-    return [f"{speeds}; level ground, a constant speed past plots, no shocks"]
+    starts = f"starts and stops of {STARTS:g} m/s^2 take {scan.starting:.2f} of what the drives hold"
+    return [f"{speeds}; {starts}; level ground, constant speed past plots, no shocks"]
 
 
 def scan_columns(scan: Scan) -> dict[str, list[Any]]:

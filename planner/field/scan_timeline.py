@@ -9,8 +9,8 @@ from boom_model import Boom, forward_kinematics
 from boom_model.arrays import Array
 from planner.field.extra import library
 from planner.field.scan import Scan
+from planner.field.scan_day import held
 from planner.field.scan_task import Leg
-from planner.planning import plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def timeline(boom: Boom, scan: Scan, step: float) -> Timeline:
 def _joints(boom: Boom, scan: Scan, leg: Leg, t: Array) -> Array:
     """Return joint positions (n, 5) at times from a leg's begin; the boom holds still after its moves."""
     if not leg.moves:
-        return np.tile(_held(boom, scan, leg), (len(t), 1))
+        return np.tile(held(boom, scan.task, scan.moves, leg), (len(t), 1))
     q = np.empty((len(t), 5))
     begin = 0.0
     for name in leg.moves:
@@ -79,16 +79,6 @@ def _joints(boom: Boom, scan: Scan, leg: Leg, t: Array) -> Array:
         q[later] = np.stack([np.interp(t[later] - begin, motion.t, column) for column in motion.q.T], axis=-1)
         begin += motion.duration
     return q
-
-
-def _held(boom: Boom, scan: Scan, leg: Leg) -> Array:
-    """Return the joint position (5,) of a leg without a move: where a move from or to it is."""
-    for name, move in scan.moves.items():
-        start, _, goal = name.partition(" to ")
-        if leg.start in (start, goal):
-            held: Array = move.trajectory.q[-1 if leg.start == goal else 0]
-            return held
-    return np.asarray(plan(boom, leg.start, leg.start, constraint=scan.task.constraint).trajectory.q[0])
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,11 @@
 """Lines over the ground while the vehicle drives: seen from the ground, from the planned joints and the track alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from boom_model import Boom, InfeasibleError, InputError, forward_kinematics
+from boom_model import BaseMotion, Boom, InfeasibleError, InputError, forward_kinematics, inverse_dynamics
 from planner.checks.rows import Verdict
 from planner.field.plots import PlotMap
 from planner.field.scan import Scan, plan_scan
@@ -12,6 +14,7 @@ from planner.field.scan_rows import length, turn, turn_length
 from planner.field.scan_task import ScanTask
 from planner.field.scan_timeline import seen_so_far, timeline
 from planner.missions.mission import load_mission, plan_cycle
+from planner.timing.path_limits import load_ratio
 from tests.field.trials import trial
 
 BOOM = Boom.load()
@@ -112,6 +115,22 @@ def test_too_fast_names_the_largest_speed():
         plan_scan(BOOM, plots, ScanTask((0.5, 0.5), passes=1))
     with pytest.raises(InputError, match="9 passes; the plots take 1 to 3"):
         plan_scan(BOOM, plots, ScanTask((0.5, 0.5), speed=0.5, passes=9, profile="cubic"))
+
+
+def test_starts_and_stops_load_the_drives_more_than_standing(small):
+    """The worst of four directions of 1 m/s^2 at the held positions, by gravity tilted as d'Alembert says."""
+    starts = {leg.start: leg for leg in small.legs}
+    worst = 0.0
+    for leg in starts.values():
+        name = next(name for name in small.moves if leg.moves and name == leg.moves[0])
+        q = small.moves[name].trajectory.q[0]
+        for way in np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]]):
+            pull = np.array([*way, BOOM.gravity])
+            strong = replace(BOOM, gravity=float(np.linalg.norm(pull)))
+            tau = inverse_dynamics(strong, q, np.zeros(5), np.zeros(5), base=BaseMotion.of(up=pull), reactions=False).tau
+            worst = max(worst, load_ratio(BOOM, tau, np.zeros(5), np.zeros(5)).max())
+    assert small.starting == pytest.approx(worst, rel=1e-6)
+    assert 0.1 < small.starting < 1.0
 
 
 @pytest.mark.parametrize("apart", [0.0, 1.5, 5.1, 8.0, 11.0, -5.1])
