@@ -6,6 +6,7 @@ differs in more than digits, or an answer is longer than LONGEST lines.
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -54,6 +55,16 @@ PAGES = {
             "boom validate",
         ),
     ),
+    "answers-field": (
+        "Answers in the field",
+        (
+            "boom plots demos/field/trial.toml",
+            "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic",
+            "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic --speed 0.5 --mission scan.toml",
+            "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic --speed 0.5 --passes 1",
+            "boom mission scan.toml",
+        ),
+    ),
 }
 
 
@@ -61,6 +72,7 @@ def main() -> int:
     """Write or check every page; return 1 if one is not as it should be."""
     check, wrong = "--check" in sys.argv[1:], []
     with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(GUIDE.parent / "field", Path(folder) / "demos" / "field")
         for name, (title, commands) in PAGES.items():
             parts = [f"# {title}\n", INTRODUCTION]
             for command in commands:
