@@ -26,6 +26,7 @@ from boom_model.kinematics.constraints import Constraint, parse_constraint
 from planner.motion.planned import PlannedMotion
 from planner.motion.trajectory import STEP
 from planner.move_spec import MoveSpec
+from planner.paths.clearance import require_path_clear
 from planner.paths.tip_path import TipPath, follow
 from planner.planning import Move, check_motion, plan_motion
 from planner.timing.path_limits import jerk_stretch, least_stretch
@@ -250,6 +251,7 @@ def _paths(boom: Boom, pieces: tuple[GroundPiece, ...], rule: Constraint) -> tup
     paths: list[TipPath] = []
     for piece in pieces:
         paths.append(follow(boom, piece, DOWN, rule, reference=paths[-1](1.0) if paths else None))
+        require_path_clear(boom, paths[-1])
     return tuple(paths)
 
 

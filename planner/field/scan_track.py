@@ -30,6 +30,7 @@ from planner.field.scan_rows import Row, rows_of
 from planner.field.scan_task import ScanTask
 from planner.field.vehicle_log import VehicleLog
 from planner.motion.trajectory import STEP, Trajectory, sample
+from planner.paths.clearance import require_path_clear
 from planner.paths.tip_path import TipPath, follow
 from planner.timing.limit_ratios import Limit, limit_ratios
 from planner.timing.time_law import Motion, TimeLaw
@@ -266,6 +267,7 @@ def _pass(boom: Boom, task: ScanTask, row: Row, line: float, mount: MountMotion)
     beside = float(curve(np.linspace(0.0, 1.0, 50))[:, 1].mean())
     try:
         path = follow(boom, curve, DOWN, parse_constraint(task.constraint), tolerance=_TOLERANCE)
+        require_path_clear(boom, path)
     except InfeasibleError as error:
         why = str(error).partition(": ")[0]
         return Pass(row.number, beside, curve, None, None, f"on the line {beside:.2f} m beside the mount, {why}", {})

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from boom_model import BaseMotion, Boom, InfeasibleError, InputError, forward_kinematics, inverse_dynamics
+from boom_model.keep_out import Capsule
 from planner.checks.rows import Verdict
 from planner.field.plots import PlotMap
 from planner.field.scan import Scan, plan_scan
@@ -15,6 +16,7 @@ from planner.field.scan_task import ScanTask
 from planner.field.scan_timeline import seen_so_far, timeline
 from planner.missions.mission import load_mission, plan_cycle
 from planner.timing.path_limits import load_ratio
+from tests.builders import ORIGIN, with_shapes
 from tests.field.trials import trial
 
 BOOM = Boom.load()
@@ -28,14 +30,24 @@ def lines():
     return ground_lines(BOOM, crossing, "horizontal", "cubic")
 
 
-@pytest.fixture(scope="module")
-def small() -> Scan:
+def small_map() -> PlotMap:
+    """Two rows of two plots of the trial."""
     whole, _ = trial()
     few = [k for k in range(40) if whole.rows[k] <= 2 and whole.ranges[k] <= 2]
     names, rings = [whole.names[k] for k in few], [list(whole.rings[k]) for k in few]
     rows, ranges = [whole.rows[k] for k in few], [whole.ranges[k] for k in few]
-    plots = PlotMap.of(names, rings, rows=rows, ranges=ranges, height=480.0)
-    return plan_scan(BOOM, plots, ScanTask((0.5, 0.5), speed=SPEED, profile="cubic"))
+    return PlotMap.of(names, rings, rows=rows, ranges=ranges, height=480.0)
+
+
+@pytest.fixture(scope="module")
+def small() -> Scan:
+    return plan_scan(BOOM, small_map(), ScanTask((0.5, 0.5), speed=SPEED, profile="cubic"))
+
+
+@pytest.fixture(scope="module")
+def twice() -> Scan:
+    """Two passes with an odd number of lines: the tip ends at the other edge."""
+    return plan_scan(BOOM, small_map(), ScanTask((0.5, 0.8), speed=0.1, passes=2, profile="cubic"))
 
 
 def test_lines_are_straight_over_the_ground(lines):
@@ -86,23 +98,38 @@ def test_one_pass_covers_the_plots(small):
     assert seen.share[-1].min() >= 0.985  # on points 5 cm apart
 
 
-def test_the_day_is_continuous(small):
+def test_two_passes_with_an_odd_number_of_lines(twice):
+    assert twice.passes == 2
+    assert twice.visits[0].ground[0][0].crossing.lines == 5
+    assert twice.coverage.min() >= 0.99
+    assert sum(leg.what == "pass" for leg in twice.legs) == 8
+    assert {leg.moves[0] for leg in twice.legs if leg.what == "pass"} >= {
+        "lines across, pass 1, from the near edge",
+        "lines across, pass 1, from the far edge",
+    }
+
+
+@pytest.mark.parametrize("which", ["small", "twice"])
+def test_the_day_is_continuous(which, request):
     """Mount and joints have no jump from one leg to the next, and the vehicle is no faster than it drives."""
-    step = 0.1
+    step, small = 0.1, request.getfixturevalue(which)
     line = timeline(BOOM, small, step)
     assert np.linalg.norm(np.diff(line.mount, axis=0), axis=1).max() <= 1.0 * step + 1e-6
     assert (np.abs(np.diff(line.q, axis=0)) <= 1.01 * step * BOOM.limits.velocity).all()
     assert line.t[-1] == pytest.approx(small.duration, abs=2 * step)
 
 
-def test_its_mission_lasts_as_long_as_the_day(small, tmp_path):
+@pytest.mark.parametrize(("which", "passes"), [("small", 4), ("twice", 8)])
+def test_its_mission_lasts_as_long_as_the_day(which, passes, tmp_path, request):
+    small = request.getfixturevalue(which)
     place = tmp_path / "scan.toml"
     place.write_text(small.mission)
     cycle = plan_cycle(BOOM, load_mission(str(place)))
     pairs = list(zip(cycle.legs, cycle.counts, strict=True))
-    ways = sum(leg.trajectory.duration for leg in (cycle.legs[0], cycle.legs[-1]))  # from transport and back
+    # From transport to the first position of each pass, and back.
+    ways = sum(leg.trajectory.duration for leg in cycle.legs if leg.label.startswith(("to q=", "to transport")))
     assert sum(leg.trajectory.duration * count for leg, count in pairs) - ways == pytest.approx(small.duration, abs=0.1)
-    assert sum(count for leg, count in pairs if leg.label == "a motion of the file") == 4
+    assert sum(count for leg, count in pairs if leg.label == "a motion of the file") == passes
 
 
 def test_too_fast_names_the_largest_speed():
@@ -115,6 +142,12 @@ def test_too_fast_names_the_largest_speed():
         plan_scan(BOOM, plots, ScanTask((0.5, 0.5), passes=1))
     with pytest.raises(InputError, match="9 passes; the plots take 1 to 3"):
         plan_scan(BOOM, plots, ScanTask((0.5, 0.5), speed=0.5, passes=9, profile="cubic"))
+
+
+def test_keep_out_shapes_stop_lines_over_the_ground():
+    """A post beside the track, on the way of the arm."""
+    post = Capsule("post", np.array([0.0, 0.9, -1.0]), np.array([0.0, 0.9, 2.5]), 0.1, ORIGIN)
+    assert fastest_crossing(with_shapes(post), ACROSS, 4, 0.45, 3.0, 0.9, "horizontal", "cubic") is None
 
 
 def test_starts_and_stops_load_the_drives_more_than_standing(small):
