@@ -64,6 +64,16 @@ PAGES = {
             "boom validate",
         ),
     ),
+    "answers-field": (
+        "Answers in the field",
+        (
+            "boom plots demos/field/trial.toml",
+            "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic",
+            "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic --speed 0.5 --mission scan.toml",
+            "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic --speed 0.5 --passes 1",
+            "boom mission scan.toml",
+        ),
+    ),
 }
 
 

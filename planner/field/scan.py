@@ -2,15 +2,20 @@
 
 The vehicle drives along each row of plots, to and fro from row to row, with the plots on its left.
 With stops, the boom sweeps lines of the tip along the row, at one pitch and height, beside each
-other over the plot. While it drives, the boom stands still over one of these lines, and the
-vehicle passes once for each; the boom changes lines at the end of the row.
+other over the plot.
+
+While the vehicle drives past, there are two ways. On lines across the plot, the vehicle's motion is
+taken off: they are straight over the ground (`scan_ground`), and the boom's speed limits the
+vehicle's. Or the boom stands still over one line along the row, and the vehicle passes once for
+each; between passes it drives back. The fewest passes that the boom can follow are taken.
 
 All plots with the same place beside the track get the same moves, so a move is planned once. What
 is seen is counted from the motions as planned, footprint by footprint.
 """
 
-from dataclasses import dataclass
-from itertools import groupby, pairwise
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,64 +24,19 @@ from boom_model.arrays import Array
 from boom_model.kinematics.constraints import parse_constraint
 from planner.field.extra import library
 from planner.field.plots import PlotMap
+from planner.field.scan_day import Day, legs, mission_text, starting_ratio
+from planner.field.scan_ground import DOWN, GroundLines, fastest_crossing, ground_lines, ground_move, mirrored
+from planner.field.scan_rows import Beside, Row, rows_of
+from planner.field.scan_task import Leg, PassOption, ScanTask, Visit, first_line, ground_name, targets_of
 from planner.planning import Move, plan, torques
 from planner.progress import Track
 
-DOWN = -np.pi / 2.0
 _WINDOW = 0.1  # [m] steps in which the reach along a line is sought
 _WIDEST = 3.0  # [m]
 _OFFSETS = np.arange(1.0, 2.61, 0.1)
-_STEP = 0.1  # [m] between points of a line whose reach is tried
-_MOST_PLOTS = 5000
 _SAME = 3  # decimals [m] to which plots beside a track are the same
-
-
-@dataclass(frozen=True)
-class ScanTask:
-    """What to scan with, in SI."""
-
-    footprint: tuple[float, float]
-    """Of the sensor on the canopy, along the arm and across it [m]."""
-    rate: float = 4.0
-    """Of the sensor [Hz]."""
-    tip_height: float = 0.9
-    """Of the tip over the mount [m]: canopy and distance, less the height of the mount."""
-    overlap: float = 0.1
-    """Of two lines beside each other, as a share of the footprint."""
-    offset: float | None = None
-    """From the track to the middle of a row [m]; None is where the fewest stops do."""
-    speed: float | None = None
-    """Of the vehicle past the plots [m/s]; None is with stops."""
-    drive_speed: float = 1.0
-    """Of the vehicle from stop to stop [m/s]."""
-    profile: str = "jerk-limited"
-    constraint: str = "horizontal"
-
-
-@dataclass(frozen=True, eq=False)
-class Beside:
-    """A plot as its track sees it: x along the track from the middle of the plot, y to the left [m]."""
-
-    plot: int
-    row: int
-    along: float
-    """Of its middle along the track [m]."""
-    x: tuple[float, float]
-    y: tuple[float, float]
-
-
-@dataclass(frozen=True, eq=False)
-class Visit:
-    """A plot's part of the scan."""
-
-    stops: tuple[float, ...]
-    """Of the mount, along the plot from its middle [m]."""
-    lines: tuple[float, ...]
-    """Of the tip, to the left of the track [m]."""
-    half: float
-    """How far the tip goes to either side of the mount [m]."""
-    reason: str
-    """Why a line cannot be reached; empty where all can."""
+_PHASES = 4  # of the sensor's clock against the plot, of which the worst coverage counts
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,22 +46,49 @@ class Scan:
     task: ScanTask
     offset: float
     plots: PlotMap
+    rows: tuple[Row, ...]
     beside: tuple[Beside, ...]
     visits: tuple[Visit, ...]
+    """In the order of the drive, as `beside`."""
     moves: dict[str, Move]
     """Every distinct move, by its words."""
+    options: tuple[PassOption, ...]
+    """What other numbers of passes would do; () with stops."""
     coverage: Array
     """(plots,) share of each plot that is seen"""
     overlap: Array
     """(plots,) area seen over that seen at least once"""
+    legs: tuple[Leg, ...]
+    """The vehicle's day, from the first row to the last."""
     seconds: Array
-    """(plots,) over each plot, the drive to the next stop included [s]"""
+    """(plots,) of work over each plot: at its stops, or from edge to edge in every pass [s]"""
     energy: Array
     """(plots,) work of the joints, without what they give back [J]"""
-    mission: str
-    """The day as a mission file's text."""
-    track: Array
-    """(m, 2) of the mount, in the plane of the map [m]"""
+    starting: float
+    """Largest demand over limit of a drive that holds while the vehicle starts, stops or turns."""
+
+    @property
+    def passes(self) -> int:
+        """Along each row; 0 with stops."""
+        if self.task.speed is None:
+            return 0
+        return max(len(visit.ground) or len(visit.lines) for visit in self.visits)
+
+    @property
+    def duration(self) -> float:
+        """Of the day, without the way from the transport pose and back [s]."""
+        return sum(leg.duration for leg in self.legs)
+
+    @cached_property
+    def mission(self) -> str:
+        """The day as a mission file's text."""
+        return mission_text(self)
+
+    @cached_property
+    def track(self) -> Array:
+        """(m, 2) of the mount at its stops, or at the ends of its passes, in the plane of the map [m]."""
+        kind = "stop" if self.task.speed is None else "pass"
+        return np.concatenate([leg.way for leg in self.legs if leg.what == kind] or [np.empty((0, 2))])
 
     @property
     def crossed(self) -> int:
@@ -126,21 +113,27 @@ def plan_scan(boom: Boom, plots: PlotMap, task: ScanTask, track: Track = iter) -
 
     Raises:
         InputError: the map has no rows, or the task is malformed.
-        InfeasibleError: no plot can be reached, a move cannot be planned, or the sensor is too slow
-            for the speed.
+        InfeasibleError: no plot can be reached, a move cannot be planned, or the boom or the sensor
+            is too slow for the speed.
     """
-    _check(plots, task)
-    beside, axis, turns = _beside(plots)
-    offset = _best_offset(boom, beside, task) if task.offset is None else task.offset
+    _check(task)
+    rows = rows_of(plots)
+    beside = tuple(each for row in rows for each in row.plots)
+    periods = {each.plot: row.period for row in rows for each in row.plots}
+    offset = _best_offset(boom, beside[0], task) if task.offset is None else task.offset
     kinds: dict[tuple[float, ...], list[int]] = {}
     for k, each in enumerate(beside):
-        kinds.setdefault(tuple(np.round((*each.x, *each.y), _SAME)), []).append(k)
+        kinds.setdefault(tuple(np.round((*each.x, *each.y, periods[each.plot]), _SAME)), []).append(k)
+    firsts = [beside[members[0]] for members in kinds.values()]
+    passes, options = _passes(boom, firsts, [periods[each.plot] for each in firsts], offset, task)
     visits: list[Visit] = [Visit((), (), 0.0, "")] * len(beside)
     moves: dict[str, Move] = {}
     seen: dict[int, tuple[float, float, float, float]] = {}
     for kind in track(list(kinds)):
         first = beside[kinds[kind][0]]
         visit = _visit(boom, first, offset, task)
+        if passes and visit.lines and not visit.reason:
+            visit = replace(visit, ground=_ground(boom, first, periods[first.plot], offset, task, passes))
         found = _looked(boom, first, visit, offset, task, moves)
         for k in kinds[kind]:
             visits[k], seen[k] = visit, found
@@ -149,62 +142,132 @@ def plan_scan(boom: Boom, plots: PlotMap, task: ScanTask, track: Track = iter) -
     figures = np.array([seen[k] for k in range(len(beside))])
     order = np.argsort([each.plot for each in beside])
     coverage, overlap, seconds, energy = figures[order].T
+
+    def planned(start: str, goal: str) -> str:
+        _planned(boom, start, goal, task, moves)
+        return f"{start} to {goal}"
+
+    by_plot = {each.plot: visit for each, visit in zip(beside, visits, strict=True)}
+    parts = Day(task, offset, rows, by_plot, moves, planned)
+    day = legs(parts)
+    starting = starting_ratio(boom, parts, day)
     return Scan(
-        task, offset, plots, tuple(beside), tuple(visits), moves, coverage, overlap, seconds, energy,
-        _mission(plots, beside, visits, task), _track(beside, visits, offset, axis, turns),
+        task, offset, plots, rows, beside, tuple(visits), moves, options, coverage, overlap, day, seconds, energy, starting
     )  # fmt: skip
 
 
-def _check(plots: PlotMap, task: ScanTask) -> None:
-    if None in plots.rows or None in plots.ranges:
-        raise InputError(f"{plots.source}: a scan needs the row and the range of every plot")
-    if len(plots.names) > _MOST_PLOTS:
-        raise InputError(f"{plots.source}: {len(plots.names):,} plots; a scan takes {_MOST_PLOTS:,}")
-    if task.speed is not None:
-        fastest = task.footprint[1] * (1.0 - task.overlap) * task.rate
-        if task.speed > fastest:
-            raise InfeasibleError(
-                f"at {task.speed:g} m/s, {task.rate:g} Hz and a footprint of {task.footprint[1]:g} m leave gaps; "
-                f"{fastest:.3g} m/s is the fastest"
-            )
+def _check(task: ScanTask) -> None:
+    if task.speed is None:
+        if task.passes is not None:
+            raise InputError("passes are driven at a speed; give the speed, too")
+        return
+    fastest = _fastest(task)
+    if task.speed > fastest:
+        raise InfeasibleError(
+            f"at {task.speed:g} m/s, {task.rate:g} Hz and a footprint of {task.footprint[1]:g} m leave gaps; "
+            f"{fastest:.3g} m/s is the fastest"
+        )
 
 
-def _beside(plots: PlotMap) -> tuple[list[Beside], Array, dict[int, Array]]:
-    """Return the plots as their tracks see them, in the order of the drive, the axis of the rows, and each row's middle."""
-    middles = np.array([polygon.centroid.coords[0] for polygon in plots.polygons])
-    rows, ranges = np.array(plots.rows, dtype=int), np.array(plots.ranges, dtype=int)
-    corners = plots.polygons[0].minimum_rotated_rectangle.exterior.coords
-    sides = np.diff(np.array(corners)[:3], axis=0)
-    axis = sides[int(np.argmax(np.linalg.norm(sides, axis=1)))]
-    for row in np.unique(rows):
-        mine = np.flatnonzero(rows == row)
-        if len(mine) > 1:
-            ends = mine[np.argsort(ranges[mine])][[0, -1]]
-            axis = middles[ends[1]] - middles[ends[0]]
-            break
-    axis = axis / np.linalg.norm(axis)
-    found, turns = [], {}
-    for number, row in enumerate(np.unique(rows)):
-        ahead = axis if number % 2 == 0 else -axis
-        left = np.array([-ahead[1], ahead[0]])
-        mine = np.flatnonzero(rows == row)
-        mine = mine[np.argsort(ranges[mine])][:: 1 if number % 2 == 0 else -1]
-        turns[int(row)] = middles[mine].mean(axis=0)
-        for k in mine:
-            flat = np.array(plots.polygons[k].exterior.coords)[:, :2]
-            x, y = (flat - middles[k]) @ ahead, (flat - turns[int(row)]) @ left
-            along = float((middles[k] - turns[int(row)]) @ ahead)
-            found.append(Beside(int(k), int(row), along, (float(x.min()), float(x.max())), (float(y.min()), float(y.max()))))
-    return found, axis, turns
+def _fastest(task: ScanTask) -> float:
+    """Return the speed [m/s] at which the footprints of a sensor that stands still beside the vehicle overlap as asked."""
+    return task.footprint[1] * (1.0 - task.overlap) * task.rate
+
+
+def _spread(low: float, high: float, side: float, overlap: float) -> Array:
+    """Return the middles of the fewest footprints of a side that lie between two edges, overlapping [m]."""
+    width = high - low
+    if side >= width:
+        return np.array([0.5 * (low + high)])
+    count = int(np.ceil((width - side * overlap) / (side * (1.0 - overlap)) - 1e-9))
+    return np.linspace(low + side / 2.0, high - side / 2.0, max(count, 2))
 
 
 def _lines(y: tuple[float, float], task: ScanTask) -> Array:
     """Return where the middles of the lines are, from edge to edge of a plot [m]."""
-    width, side = y[1] - y[0], task.footprint[0]
-    if side >= width:
-        return np.array([0.5 * (y[0] + y[1])])
-    count = int(np.ceil((width - side * task.overlap) / (side * (1.0 - task.overlap)) - 1e-9))
-    return np.linspace(y[0] + side / 2.0, y[1] - side / 2.0, max(count, 2))
+    return _spread(*y, task.footprint[0], task.overlap)
+
+
+def lines_of(row: Row, task: ScanTask) -> Array:
+    """Return where the middles of a row's lines are, to the left of its middle [m]."""
+    low, high = min(plot.y[0] for plot in row.plots), max(plot.y[1] for plot in row.plots)
+    return _lines((low, high), task)
+
+
+def _strips(y: tuple[float, float], task: ScanTask, passes: int) -> list[tuple[float, float]]:
+    """Return from where to where the tip goes across a plot in every pass [m]; the strips overlap as lines do."""
+    side = task.footprint[0]
+    sweep = ((y[1] - y[0]) + (passes - 1) * task.overlap * side) / passes - side
+    lows = np.linspace(y[0] + side / 2.0, y[1] - side / 2.0 - sweep, passes)
+    return [(float(low), float(low + sweep)) for low in lows]
+
+
+def _passes(
+    boom: Boom, kinds: list[Beside], periods: list[float], offset: float, task: ScanTask
+) -> tuple[int, tuple[PassOption, ...]]:
+    """Return the fewest passes with lines over the ground at the task's speed, and what every number of passes allows.
+
+    It is 0 where the boom stands still over one line in each pass.
+    """
+    if task.speed is None:
+        return 0, ()
+    most = max(len(_lines(each.y, task)) for each in kinds)
+    options, chosen = [], 0
+    for passes in range(1, most):
+        option = _option(boom, kinds, periods, offset, task, passes)
+        options.append(option)
+        if not chosen and task.passes in (None, passes) and option.speed >= task.speed * (1.0 - _ROUNDING):
+            chosen = passes
+    options.append(PassOption(most, 0.0, _fastest(task), "the sensor's rate"))
+    if task.passes is not None and task.passes != chosen:
+        possible = {option.passes: option.speed for option in options}
+        if task.passes not in possible:
+            raise InputError(f"{task.passes} passes; the plots take 1 to {most}")
+        if task.passes < most:
+            raise InfeasibleError(
+                f"with {task.passes} pass{'es' if task.passes > 1 else ''} along a row, the boom follows the ground up to "
+                f"{possible[task.passes]:.3g} m/s; {task.speed:g} m/s takes {_enough(options, task.speed)} passes"
+            )
+    return chosen, tuple(options)
+
+
+def _enough(options: list[PassOption], speed: float) -> int:
+    return next(option.passes for option in options if option.speed >= speed)
+
+
+def _option(boom: Boom, kinds: list[Beside], periods: list[float], offset: float, task: ScanTask, passes: int) -> PassOption:
+    """Return the largest speed of a number of passes over the kinds of plot; what is asked for is planned in full."""
+    speed, sweep, limit = np.inf, 0.0, "the lines over the plot"
+    for each, period in zip(kinds, periods, strict=True):
+        along = _spread(*each.x, task.footprint[1], task.overlap)
+        for low, high in _strips(each.y, task, passes):
+            y, sweep = (low + offset, high + offset), max(sweep, high - low)
+            spacing = float(along[1] - along[0]) if len(along) > 1 else 0.0
+            found = fastest_crossing(boom, y, len(along), spacing, period, task.tip_height, task.constraint, task.profile)
+            if found is None:
+                return PassOption(passes, sweep, 0.0, "the tip's reach")
+            best = found[0]
+            if task.speed is not None and best >= task.speed:
+                whole = ground_lines(boom, found[1], task.constraint, task.profile)
+                best, limit = whole.speed, whole.limit
+            speed = min(speed, best)
+    return PassOption(passes, sweep, speed, limit)
+
+
+def _ground(
+    boom: Boom, plot: Beside, period: float, offset: float, task: ScanTask, passes: int
+) -> tuple[tuple[GroundLines, ...], ...]:
+    along = _spread(*plot.x, task.footprint[1], task.overlap)
+    spacing = float(along[1] - along[0]) if len(along) > 1 else 0.0
+    found = []
+    for low, high in _strips(plot.y, task, passes):
+        y = (low + offset, high + offset)
+        best = fastest_crossing(boom, y, len(along), spacing, period, task.tip_height, task.constraint, task.profile)
+        if best is not None:
+            lines = ground_lines(boom, best[1], task.constraint, task.profile)
+            both = best[1].lines % 2 == 1
+            found.append((lines, mirrored(boom, lines, task.constraint)) if both else (lines,))
+    return tuple(found)
 
 
 def _window(boom: Boom, lines: Array, task: ScanTask, most: float) -> float:
@@ -221,10 +284,10 @@ def _window(boom: Boom, lines: Array, task: ScanTask, most: float) -> float:
     return half
 
 
-def _best_offset(boom: Boom, beside: list[Beside], task: ScanTask) -> float:
+def _best_offset(boom: Boom, plot: Beside, task: ScanTask) -> float:
     """Return the offset of the track with the widest window, the middle of several."""
-    lines = _lines(beside[0].y, task)
-    most = 0.5 * (beside[0].x[1] - beside[0].x[0]) if task.speed is None else 0.0
+    lines = _lines(plot.y, task)
+    most = 0.5 * (plot.x[1] - plot.x[0]) if task.speed is None else 0.0
     windows = np.array([_window(boom, lines + offset, task, min(most, _WIDEST)) for offset in _OFFSETS])
     best = _OFFSETS[windows >= windows.max() - 1e-9]
     return float(np.round(best[len(best) // 2], 6))
@@ -251,52 +314,89 @@ def _visit(boom: Boom, plot: Beside, offset: float, task: ScanTask) -> Visit:
     return Visit((), (), 0.0, reason or "the tip has no room along the row")
 
 
-def _points(visit: Visit, task: ScanTask) -> list[str]:
-    """Return the targets of the tip over one stop, to and fro from line to line."""
-    targets = []
-    for number, y in enumerate(visit.lines):
-        half = visit.half
-        ends = (-half, half) if number % 2 == 0 else (half, -half)
-        targets += [f"tip={x + 0.0:.4f},{y:.4f},{task.tip_height:.4f}" for x in (ends if half > 0.0 else (0.0,))]
-    return targets
-
-
 def _looked(
     boom: Boom, plot: Beside, visit: Visit, offset: float, task: ScanTask, moves: dict[str, Move]
 ) -> tuple[float, float, float, float]:
     """Plan a plot's moves; return the share seen, the overlap, the seconds and the energy."""
-    shapely = library("shapely")
     if not visit.lines:
         return 0.0, 0.0, 0.0, 0.0
-    targets = _points(visit, task)
-    stop_seconds = energy = 0.0
-    marks: list[Array] = []
+    length = plot.x[1] - plot.x[0]
+    if visit.ground and task.speed is not None:
+        looks, energy = _ground_looks(boom, plot, visit, task, moves)
+        return *_seen(plot, offset, looks), len(visit.ground) * length / task.speed, energy
+    targets = targets_of(visit, task)
     for a, b in pairwise(targets):
         for start, goal in ((a, b), (b, a)):  # every other stop is swept the other way
-            name = f"{start} to {goal}"
-            if name not in moves:
-                moves[name] = plan(boom, start, goal, along="line", profile=task.profile, constraint=task.constraint)
-        move = moves[f"{a} to {b}"].trajectory
-        stop_seconds += move.duration
-        tau = torques(boom, move)
-        energy += float(np.trapezoid(np.maximum(tau * move.qd, 0.0).sum(axis=1), move.t))
-        at = np.unique(np.append(np.searchsorted(move.t, np.arange(0.0, move.duration, 1.0 / task.rate)), len(move.t) - 1))
-        marks.append(_footprints(boom, move.q[at], task))
-    length = plot.x[1] - plot.x[0]
-    if task.speed is None:
-        if not marks:
-            marks = [_still(boom, targets[0], task)]
-        spots = [marked + np.array([x, 0.0]) for x in visit.stops for marked in np.concatenate(marks)]
-        seconds = len(visit.stops) * (max(stop_seconds, 1.0 / task.rate) + length / len(visit.stops) / task.drive_speed)
-        energy *= len(visit.stops)
-    else:
-        steps = np.arange(plot.x[0], plot.x[1] + task.speed / task.rate, task.speed / task.rate)
-        spots = [marked + np.array([x, 0.0]) for target in targets for marked in _still(boom, target, task) for x in steps]
-        seconds = len(targets) * length / task.speed
+            _planned(boom, start, goal, task, moves)
+    swept = [moves[f"{a} to {b}"] for a, b in pairwise(targets)]
+    if task.speed is not None:
+        still = [_still(boom, target, task) for target in targets]
+        step = task.speed / task.rate
+        looks = []
+        for phase in np.arange(_PHASES) * step / _PHASES:
+            steps = np.arange(plot.x[0] - phase, plot.x[1] + step, step)
+            looks.append(np.concatenate([marked + np.array([x, 0.0]) for marked in still for x in steps]))
+        return *_seen(plot, offset, looks), len(targets) * length / task.speed, 0.0
+    marks = [_footprints(boom, move.trajectory.q[_shots(move, task)], task) for move in swept] or [
+        _still(boom, targets[0], task)
+    ]
+    seconds = len(visit.stops) * max(sum(move.report.duration for move in swept), 1.0 / task.rate)
+    look = np.concatenate([marked + np.array([x, 0.0]) for x in visit.stops for marked in marks])
+    return *_seen(plot, offset, [look]), seconds, len(visit.stops) * sum(_work(boom, move) for move in swept)
+
+
+def _planned(boom: Boom, start: str, goal: str, task: ScanTask, moves: dict[str, Move]) -> Move:
+    name = f"{start} to {goal}"
+    if name not in moves:
+        try:
+            moves[name] = plan(boom, start, goal, along="line", profile=task.profile, constraint=task.constraint)
+        except InfeasibleError:  # a line from row to row may lead past the mount
+            moves[name] = plan(boom, start, goal, profile=task.profile, constraint=task.constraint)
+    return moves[name]
+
+
+def _ground_looks(boom: Boom, plot: Beside, visit: Visit, task: ScanTask, moves: dict[str, Move]) -> tuple[list[Array], float]:
+    """Plan the moves over the ground; return the footprints for every phase of the sensor's clock, and the energy."""
+    speed, energy = task.speed or 0.0, 0.0
+    looks: list[list[Array]] = [[] for _ in range(_PHASES)]
+    for number, both in enumerate(visit.ground):
+        crossing = both[0].crossing
+        for side, each in enumerate(both):
+            moves[ground_name(number, side)] = ground_move(boom, each, speed)
+            _planned(boom, *each.crossing.forward, task, moves)
+        move = moves[ground_name(number, 0)]
+        energy += _work(boom, move) + _work(boom, moves[" to ".join(both[0].crossing.forward)])
+        begin = first_line(plot, crossing.lines, task) + crossing.begin
+        for phase in range(_PHASES):
+            t = (np.arange(int(move.report.duration * task.rate)) + phase / _PHASES) / task.rate
+            at = np.searchsorted(move.trajectory.t, t).clip(max=len(move.trajectory.t) - 1)
+            marks = _footprints(boom, move.trajectory.q[at], task)
+            travelled = np.stack([begin + speed * move.trajectory.t[at], np.zeros(len(at))], axis=-1)
+            looks[phase].append(marks + travelled[:, None, :])
+    return [np.concatenate(each) for each in looks], energy
+
+
+def _shots(move: Move, task: ScanTask) -> Array:
+    """Return the samples at which the sensor looks: at its rate from the begin, and at the end."""
+    t = move.trajectory.t
+    return np.unique(np.append(np.searchsorted(t, np.arange(0.0, t[-1], 1.0 / task.rate)), len(t) - 1))
+
+
+def _work(boom: Boom, move: Move) -> float:
+    motion = move.trajectory
+    return float(np.trapezoid(np.maximum(torques(boom, motion) * motion.qd, 0.0).sum(axis=1), motion.t))
+
+
+def _seen(plot: Beside, offset: float, looks: list[Array]) -> tuple[float, float]:
+    """Return the share of a plot that footprints (n, 4, 2) see, and how often; the worst of several looks."""
+    shapely = library("shapely")
     area = shapely.box(plot.x[0], plot.y[0] + offset, plot.x[1], plot.y[1] + offset)
-    pieces = shapely.intersection(shapely.polygons(np.array(spots)), area)
-    union = shapely.union_all(pieces)
-    return union.area / area.area, float(shapely.area(pieces).sum() / max(union.area, 1e-12)), seconds, energy
+    found = []
+    for look in looks:
+        pieces = shapely.intersection(shapely.polygons(look), area)
+        union = shapely.union_all(pieces)
+        found.append((union.area / area.area, float(shapely.area(pieces).sum() / max(union.area, 1e-12))))
+    return min(found)
 
 
 def _footprints(boom: Boom, q: Array, task: ScanTask) -> Array:
@@ -313,76 +413,3 @@ def _footprints(boom: Boom, q: Array, task: ScanTask) -> Array:
 def _still(boom: Boom, target: str, task: ScanTask) -> Array:
     move = plan(boom, target, target, constraint=task.constraint)
     return _footprints(boom, move.trajectory.q[:1], task)
-
-
-def _mission(plots: PlotMap, beside: list[Beside], visits: list[Visit], task: ScanTask) -> str:
-    """Return the scan as a mission: from and to transport, a line at a time, holding while the vehicle drives.
-
-    Stops or passes that are alike repeat in pairs, the second swept the other way.
-    """
-    lines = [
-        f"# {len(plots.names)} plots of {plots.source}, as boom scan planned them.",
-        'name = "row scan"',
-        'basis = "estimated"',
-        f'source = "boom scan {"with stops" if task.speed is None else f"at {task.speed:g} m/s"}"',
-        'start = "transport"',
-        f'constraint = "{task.constraint}"',
-    ]
-    here = ""
-    for (targets, hold), group in groupby(_blocks(beside, visits, task)):
-        count = len(list(group))
-        order = targets[::-1] if here == targets[-1] else targets
-        if here != order[0]:
-            lines += _step(task, order[0], line=bool(here))
-        there, back = _sweep(order, hold, task), _sweep(order[::-1], hold, task)
-        if count > 1:
-            lines += ["", "[[steps]]", f"repeat = {count // 2}", *(_inner(line) for line in there + back)]
-        if count % 2:
-            lines += there
-        here = order[-1] if count % 2 else order[0]
-    return "\n".join([*lines, *_step(task, "transport", line=False)]) + "\n"
-
-
-def _blocks(beside: list[Beside], visits: list[Visit], task: ScanTask) -> list[tuple[tuple[str, ...], str]]:
-    """Return the targets of every stop, or of every row of passes, and how long the boom holds then [s]."""
-    found = []
-    for _, group in groupby(zip(beside, visits, strict=True), lambda pair: pair[0].row):
-        mine = [(each, visit) for each, visit in group if visit.lines]
-        if not mine:
-            continue
-        if task.speed is not None:
-            length = max(e.along + e.x[1] for e, _ in mine) - min(e.along + e.x[0] for e, _ in mine)
-            found.append((tuple(_points(mine[0][1], task)), f"{max(length / task.speed, 0.01):.3f}"))
-            continue
-        for each, visit in mine:
-            hold = max((each.x[1] - each.x[0]) / len(visit.stops) / task.drive_speed, 0.01)
-            found += [(tuple(_points(visit, task)), f"{hold:.3f}")] * len(visit.stops)
-    return found
-
-
-def _sweep(targets: tuple[str, ...], hold: str, task: ScanTask) -> list[str]:
-    """Return the steps from the first target on: holding after the last, or, driving past, at each."""
-    held = ["", "[[steps]]", f"hold_s = {hold}"]
-    if task.speed is None:
-        return [line for target in targets[1:] for line in _step(task, target, line=True)] + held
-    return held + [line for target in targets[1:] for line in (*_step(task, target, line=True), *held)]
-
-
-def _step(task: ScanTask, target: str, *, line: bool) -> list[str]:
-    return ["", "[[steps]]", f'to = "{target}"', f'profile = "{task.profile}"', *(['along = "line"'] if line else [])]
-
-
-def _inner(line: str) -> str:
-    return line.replace("[[steps]]", "[[steps.steps]]")
-
-
-def _track(beside: list[Beside], visits: list[Visit], offset: float, axis: Array, turns: dict[int, Array]) -> Array:
-    """Return the stops, or the ends of the passes, of the mount in the plane of the map (m, 2)."""
-    points = []
-    for number, row in enumerate(dict.fromkeys(each.row for each in beside)):
-        ahead = axis if number % 2 == 0 else -axis
-        left = np.array([-ahead[1], ahead[0]])
-        for each, visit in zip(beside, visits, strict=True):
-            if each.row == row:
-                points += [turns[row] - offset * left + (each.along + x) * ahead for x in visit.stops]
-    return np.array(points)

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from boom_model import Basis, Boom, InfeasibleError, InputError, Origin, Sourced, forward_kinematics
-from boom_model.arrays import Array, read_only
+from boom_model.arrays import Array, checked, read_only
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import parse_constraint
 from boom_model.plausible import DURATION, LIFE, TIP_TOLERANCE
@@ -27,7 +27,7 @@ from planner.checks.drives.duty import Duty
 from planner.checks.energy import ASSUMED_SUPPLY, Energy, Supply, energy_of
 from planner.checks.evaluation import Evaluation
 from planner.files import named_file
-from planner.motion.trajectory import STEP, Trajectory
+from planner.motion.trajectory import STEP, Trajectory, through_rest
 from planner.motion.vehicle import LEVEL, VehicleCase
 from planner.move_spec import MoveWords
 from planner.paths.targets import Target, TipTarget, parse_pitch, parse_target, resolve
@@ -42,9 +42,11 @@ _MOST_STEPS = 100_000
 _SAME_POSITION = 1e-6
 _DECIMALS = 9
 _DOWN, _HORIZONTAL = "down", "horizontal"
+_KINDS = ("to", "hold_s", "pause_s", "motion", "repeat")
 _SHARED = ("profile", "pass_via", "jerk_bound", "average_torque", "along", "pitch", "constraint")
 """Keys of a step that have the name and meaning of fields of MoveWords."""
 _Duration = Annotated[float, DURATION]
+_Sample = Annotated[list[float], Field(min_length=6, max_length=6)]
 
 
 class _Step(Table):
@@ -61,18 +63,20 @@ class _Step(Table):
     constraint: str = _HORIZONTAL
     hold_s: _Duration | None = None
     pause_s: _Duration | None = None
+    motion: Annotated[list[_Sample], Field(min_length=4)] | None = None
+    """Samples t [s], q1..q5 [rad, m] of a motion that was planned elsewhere."""
     repeat: Annotated[int, Field(gt=0)] | None = None
     steps: "list[_Step]" = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _one_of(self) -> "_Step":
-        given = [name for name in ("to", "hold_s", "pause_s", "repeat") if getattr(self, name) is not None]
+        given = [name for name in _KINDS if getattr(self, name) is not None]
         if len(given) != 1:
             raise ValueError(
-                f"a step must have one of to, hold_s, pause_s and repeat; this one has {', '.join(given) or 'none'}"
+                f"a step must have one of {', '.join(_KINDS[:-1])} and {_KINDS[-1]}; this one has {', '.join(given) or 'none'}"
             )
         allowed = {
-            "to": set(_Step.model_fields) - {"hold_s", "pause_s", "repeat", "steps"},
+            "to": set(_Step.model_fields) - {"hold_s", "pause_s", "motion", "repeat", "steps"},
             "repeat": {"repeat", "steps"},
         }.get(given[0], {given[0]})
         stray = sorted(self.model_fields_set - allowed)
@@ -369,10 +373,21 @@ def _leg(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -
     """Return a step's leg (None if nothing moves), the joint position at its end, and its notes."""
     if part.to is not None:
         return _move(boom, part, q, vehicle, step)
+    if part.motion is not None:
+        return _recorded(part.motion, q)
     seconds, powered = (part.hold_s, True) if part.hold_s is not None else (part.pause_s, False)
     zero = np.zeros((2, 5))
     still = Trajectory.from_samples([0.0, seconds or 0.0], np.tile(q, (2, 1)), zero, zero, zero)
     return Leg("hold" if powered else "pause", still, moves=False, powered=powered), q, ()
+
+
+def _recorded(samples: list[list[float]], q: Array) -> tuple[Leg, Array, tuple[str, ...]]:
+    """Return the leg of samples, with velocities and accelerations of a cubic spline at rest at both ends."""
+    table = checked("motion", samples)
+    apart = float(np.abs(table[0, 1:] - q).max())
+    if apart > _SAME_POSITION:
+        raise InfeasibleError(f"the motion does not start where the previous step ends ({apart:.3g} rad or m off)")
+    return Leg("a motion of the file", through_rest(table[:, 0] - table[0, 0], table[:, 1:]), True, True), table[-1, 1:], ()
 
 
 def _move(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -> tuple[Leg | None, Array, tuple[str, ...]]:

@@ -131,6 +131,24 @@ def concatenate(parts: Sequence[Trajectory], notes: tuple[str, ...] = ()) -> Tra
     return Trajectory.from_samples(t, q, qd, qdd, np.concatenate(jerks) if len(jerks) == len(parts) else None, notes)
 
 
+def through_rest(t: Array, q: Array) -> Trajectory:
+    """Return the motion of a cubic spline through samples, at rest at both ends, at the samples' times.
+
+    Args:
+        t: (n,) times from 0 on [s].
+        q: (n, 5) joint positions.
+
+    Raises:
+        InputError: the times do not increase.
+    """
+    from scipy.interpolate import CubicSpline
+
+    still = np.zeros_like(q)
+    plain = Trajectory.from_samples(t, q, still, still)
+    spline = CubicSpline(plain.t, plain.q, bc_type="clamped")
+    return Trajectory.from_samples(t, q, spline(t, 1), spline(t, 2))
+
+
 def at_rest(q: Array, notes: tuple[str, ...] = ()) -> Trajectory:
     """Return the trajectory of an empty move: one sample at rest at q (5,)."""
     zero = np.zeros((1, 5))

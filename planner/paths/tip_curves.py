@@ -1,6 +1,7 @@
-"""Curves of the tip: a straight line, or an arc of a circle."""
+"""Curves of the tip: a straight line, an arc of a circle, or any other of the same form."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,4 +77,14 @@ class TipArc:
         return self.radius * self.angle
 
 
-TipCurve = TipLine | TipArc
+class TipCurve(Protocol):
+    """Smooth curve of the tip over s from 0 to 1."""
+
+    def __call__(self, s: Array) -> Array:
+        """Return positions (..., 3) at s (...)."""
+        ...
+
+    @property
+    def length(self) -> float:
+        """Length [m]."""
+        ...

@@ -21,7 +21,7 @@ from boom_model.arrays import Array, Mask, checked, scalar
 from planner.bisection import bisect
 from planner.paths.redundancy import NODES, Departure, resolve, sides_of
 from planner.paths.targets import unreachable
-from planner.paths.tip_curves import TipCurve, TipLine
+from planner.paths.tip_curves import TipArc, TipCurve, TipLine
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -69,7 +69,7 @@ class TipPath:
     @property
     def sentence(self) -> str:
         """Description of the path for a report."""
-        kind = "line" if isinstance(self.curve, TipLine) else "arc"
+        kind = {TipLine: "line", TipArc: "arc"}.get(type(self.curve), "curve")
         followed = f"the tip follows a {kind} of {self.curve.length:.4g} m to within {self.deviation * 1e3:.3g} mm"
         return followed if self.departure is None else f"{followed}; {self.departure.sentence}"
 

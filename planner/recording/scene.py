@@ -149,7 +149,7 @@ def log_surroundings(recording: rr.RecordingStream, boom: Boom, tip: Array) -> N
         labels=[f"ground, {label}"], show_labels=False,
     )  # fmt: skip
     recording.log("world/ground", plane, static=True)
-    _log_vehicle(recording, ground, label)
+    log_vehicle(recording, ground, label)
     end = tip[-1]
     plot = rr.Boxes3D(
         centers=[(end[0], end[1], ground + 0.005)], half_sizes=[(*_PLOT, 0.005)], colors=[_SOIL], fill_mode="solid",
@@ -175,7 +175,7 @@ def log_height(recording: rr.RecordingStream, boom: Boom, t: Array, tip: Array) 
     recording.send_columns("world/height", [time_column(t[some])], columns)
 
 
-def _log_vehicle(recording: rr.RecordingStream, ground: float, label: str) -> None:
+def log_vehicle(recording: rr.RecordingStream, ground: float, label: str) -> None:
     """Log a vehicle on wheels behind the mount."""
     low, high = np.array([-2.4, -0.8, ground + 0.55]), np.array([0.25, 0.8, -0.02])
     body = rr.Boxes3D(

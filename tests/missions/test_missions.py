@@ -52,6 +52,21 @@ def mission(tmp_path):
     return write
 
 
+def test_samples_of_a_move_are_the_move(mission):
+    """A motion as samples has the move's loads; it must start where the step before ends."""
+    move = main_move("quintic")
+    motion = move.trajectory
+    rows = [[float(x) for x in row] for row in np.column_stack([motion.t, motion.q])[::5]]
+    rows += [] if len(motion.t) % 5 == 1 else [[float(motion.t[-1]), *map(float, motion.q[-1])]]
+    (leg,) = plan_cycle(BOOM, mission(f"[[steps]]\nmotion = {rows}\n")).legs
+    assert leg.trajectory.duration == pytest.approx(motion.duration)
+    at = np.searchsorted(motion.t, leg.trajectory.t - 1e-9)
+    assert leg.trajectory.qd == pytest.approx(motion.qd[at], abs=1e-4)
+    assert torques(BOOM, leg.trajectory) == pytest.approx(torques(BOOM, motion)[at], abs=0.5)
+    with pytest.raises(InfeasibleError, match="the motion does not start where the previous step ends"):
+        plan_cycle(BOOM, mission(f'[[steps]]\nto = "phenotyping"\n\n[[steps]]\nmotion = {rows}\n'))
+
+
 @pytest.mark.parametrize("profile", list(SHORTEST))
 def test_a_mission_of_one_move_is_the_move(mission, profile):
     move = main_move(profile)
@@ -197,7 +212,7 @@ def test_a_step_to_where_it_stands_moves_nothing(mission):
 @pytest.mark.parametrize(
     ("steps", "said"),
     [
-        ("[[steps]]\n", "one of to, hold_s, pause_s and repeat; this one has none"),
+        ("[[steps]]\n", "one of to, hold_s, pause_s, motion and repeat; this one has none"),
         ('[[steps]]\nto = "transport"\nhold_s = 1\n', "this one has to, hold_s"),
         ("[[steps]]\nhold_s = 1\nduration_s = 2\n", "a step with hold_s takes no duration_s"),
         ("[[steps]]\nrepeat = 2\n", "a step with repeat needs steps of its own"),
@@ -206,6 +221,7 @@ def test_a_step_to_where_it_stands_moves_nothing(mission):
         ("[[steps]]\nhold_s = nan\n", "key steps.0.hold_s"),
         ("[[steps]]\nhold_s = 1\ncolour = 3\n", "key steps.0.colour is not known"),
         ("steps = []\n", "key steps"),
+        ("[[steps]]\nmotion = [[0, 1, 2]]\n", "key steps.0.motion"),
     ],
 )
 def test_a_bad_mission_names_file_and_key(mission, steps, said):

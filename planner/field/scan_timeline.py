@@ -1,0 +1,134 @@
+"""A scan in time: where the mount and the joints are, and what the sensor sees, in the plane of the map."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from boom_model import Boom, forward_kinematics
+from boom_model.arrays import Array
+from planner.field.extra import library
+from planner.field.scan import Scan
+from planner.field.scan_day import held
+from planner.field.scan_task import Leg
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """Samples of the day."""
+
+    t: Array
+    """(n,) [s]"""
+    mount: Array
+    """(n, 2) [m]"""
+    ahead: Array
+    """(n, 2) unit vectors"""
+    q: Array
+    """(n, 5)"""
+    looking: NDArray[np.bool_]
+    """(n,) whether the sensor looks: at a stop, or past plots"""
+
+    def tips(self, boom: Boom) -> Array:
+        """Return the tip (n, 3): east, north, and the height over the mount [m]."""
+        return self._placed(forward_kinematics(boom, self.q).position)
+
+    def footprints(self, boom: Boom, size: tuple[float, float]) -> Array:
+        """Return the corners (n, 4, 2) of the sensor's footprint, along the arm and across it [m]."""
+        tip = forward_kinematics(boom, self.q).position
+        signs = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * size
+        c, s = np.cos(self.q[:, 0]), np.sin(self.q[:, 0])
+        out, across = np.stack([c, s, 0.0 * c], axis=-1), np.stack([-s, c, 0.0 * c], axis=-1)
+        corners = [self._placed(tip + a * out + b * across)[:, :2] for a, b in signs]
+        return np.stack(corners, axis=1)
+
+    def _placed(self, points: Array) -> Array:
+        """Return points (n, 3) of the mount's frame in the plane of the map."""
+        left = np.stack([-self.ahead[:, 1], self.ahead[:, 0]], axis=-1)
+        flat: Array = self.mount + points[:, :1] * self.ahead + points[:, 1:2] * left
+        return np.column_stack([flat, points[:, 2]])
+
+
+def timeline(boom: Boom, scan: Scan, step: float) -> Timeline:
+    """Return the day of a scan at steps of at most `step` seconds.
+
+    Args:
+        boom: the boom of the scan.
+        scan: the scan.
+        step: longest time between two samples [s].
+    """
+    begin, parts = 0.0, []
+    for leg in scan.legs:
+        t = np.linspace(0.0, leg.duration, int(np.ceil(leg.duration / step)) + 1)[:-1]
+        mount, ahead = leg.mount(t)
+        looking = np.full(len(t), leg.what in ("stop", "pass"))
+        parts.append((begin + t, mount, ahead, _joints(boom, scan, leg, t), looking))
+        begin += leg.duration
+    t, mount, ahead, q, looking = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return Timeline(t, mount, ahead, q, looking)
+
+
+def _joints(boom: Boom, scan: Scan, leg: Leg, t: Array) -> Array:
+    """Return joint positions (n, 5) at times from a leg's begin; the boom holds still after its moves."""
+    if not leg.moves:
+        return np.tile(held(boom, scan.task, scan.moves, leg), (len(t), 1))
+    q = np.empty((len(t), 5))
+    begin = 0.0
+    for name in leg.moves:
+        motion = scan.moves[name].trajectory
+        later = t >= begin
+        q[later] = np.stack([np.interp(t[later] - begin, motion.t, column) for column in motion.q.T], axis=-1)
+        begin += motion.duration
+    return q
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Share of every plot that was seen, after each of some times."""
+
+    t: Array
+    """(m,) [s]"""
+    share: Array
+    """(m, plots)"""
+
+
+def seen_so_far(boom: Boom, scan: Scan, every: float, spacing: float = 0.05) -> Seen:
+    """Return how much of each plot was seen so far, counted on a grid of points, one image after the other.
+
+    Args:
+        boom: the boom of the scan.
+        scan: the scan.
+        every: time between two counts [s].
+        spacing: of the points [m].
+    """
+    shapely = library("shapely")
+    line = timeline(boom, scan, 1.0 / scan.task.rate)
+    corners = line.footprints(boom, scan.task.footprint)
+    points = [_grid(polygon, spacing) for polygon in scan.plots.polygons]
+    seen = [np.zeros(len(each), dtype=bool) for each in points]
+    times = np.append(np.arange(every, line.t[-1], every), line.t[-1])
+    share = np.zeros((len(times), len(points)))
+    looking = np.flatnonzero(line.looking)
+    images, touched = scan.plots.tree.query(shapely.polygons(corners[looking]), predicate="intersects")
+    order = np.argsort(images, kind="stable")
+    images, touched, done = looking[images[order]], touched[order], 0
+    for k, until in enumerate(times):
+        while done < len(images) and line.t[images[done]] <= until:
+            i, plot = images[done], touched[done]
+            sides = [corners[i, 1] - corners[i, 0], corners[i, 3] - corners[i, 0]]
+            away = points[plot] - corners[i, 0]
+            inside = [(away @ side >= 0.0) & (away @ side <= side @ side) for side in sides]
+            seen[plot] |= inside[0] & inside[1]
+            done += 1
+        share[k] = [each.mean() for each in seen]
+    return Seen(times, share)
+
+
+def _grid(polygon: object, spacing: float) -> Array:
+    """Return points (k, 2) inside a polygon, evenly spaced along its longer side and across."""
+    shapely = library("shapely")
+    box = np.array(shapely.minimum_rotated_rectangle(polygon).exterior.coords)[:4]
+    sides = [box[1] - box[0], box[3] - box[0]]
+    counts = [max(2, int(np.ceil(np.linalg.norm(side) / spacing))) for side in sides]
+    a, b = np.meshgrid(*((np.arange(count) + 0.5) / count for count in counts))
+    points: Array = box[0] + a.reshape(-1, 1) * sides[0] + b.reshape(-1, 1) * sides[1]
+    return np.asarray(points[shapely.contains_xy(polygon, points)])

@@ -1,0 +1,44 @@
+"""The command `boom scan`: the day's recording and report, and a log of the vehicle."""
+
+import json
+
+import numpy as np
+from rerun.chunk import RrdReader
+
+from tests.field.trials import TRIAL as FORTY
+from tests.field.trials import corners
+from tests.field.weave import write_weaving_log
+
+
+def test_scan_records_the_day_and_reports_it(boom, tmp_path):
+    (tmp_path / "trial.toml").write_text(FORTY.format(corners=np.degrees(corners()).tolist()))
+    asked = ("scan", "trial.toml", "--footprint", "0.5,0.5", "--profile", "cubic", "--speed", "0.5")
+    code, out, _ = boom(*asked, "--recording", "scan.rrd", "--report", "scan.html", "--out", "scan.csv")
+    assert code == 0
+    assert "day: 28.8 min: 18.9 past plots, 6.3 back, 3.6 in turns" in out
+    assert "assumed: 4 m turns at 1 m/s" in out
+    report = (tmp_path / "scan.html").read_text()
+    assert "3 passes a row at 0.5 m/s" in report
+    assert report.count("data:image/png") == 1
+    assert (tmp_path / "scan.csv").read_text().startswith("plot,row,range,coverage,overlap,time_s,energy_J,reason,wkt")
+    entities = set(RrdReader(tmp_path / "scan.rrd").store().schema().entity_paths())
+    assert {"/map/plots", "/map/vehicle", "/world/plots", "/world/footprint", "/answer"} <= entities
+
+
+def test_scan_along_a_log(boom, tmp_path):
+    (tmp_path / "trial.toml").write_text(FORTY.format(corners=np.degrees(corners()).tolist()))
+    write_weaving_log(tmp_path / "vehicle.csv")
+    asked = ("scan", "trial.toml", "--footprint", "0.5,0.5", "--track", "vehicle.csv")
+    code, out, error = boom(*asked, "--out", "scan.csv")
+    assert code == 1  # one row of ten is driven
+    assert "vehicle.csv: 3 passes along 1 rows of trial.toml" in out
+    assert "4 of 40 plots seen to 99 % or more" in out
+    assert "36 of 40 plots are not reached whole: the vehicle passes 0 times with row 2 on its left" in error
+    answer = json.loads(boom(*asked, "--json")[1])
+    assert [each["row"] for each in answer["passes"]] == [1, 1, 1]
+    code, _, error = boom(*asked, "--speed", "0.5")
+    assert code == 2
+    assert "--speed does not go with --track: the log gives the track and the speed" in error
+    assert boom(*asked, "--mission", "m.toml")[0] == 2
+    assert "give the log by --track" in boom(*asked[:-2], "--rig", "rig.toml")[2]
+    assert "passes are driven at a speed" in boom(*asked[:-2], "--passes", "2")[2]
