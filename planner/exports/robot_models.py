@@ -34,7 +34,7 @@ from numpy.typing import ArrayLike
 from boom_model import JOINTS, Body, Boom, InputError, inverse_dynamics
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
-from boom_model.drives.drive import drive_torque_limit, reflected_inertia
+from boom_model.drives.drive import drive_torque_limit
 from boom_model.kinematics.frames import R_LINK_BODY
 from planner.files import replacing
 from planner.reports.report import assumptions
@@ -393,9 +393,8 @@ def _mjcf_body(element: Element, boom: Boom, link: _Link) -> None:
         i = JOINTS.index(link.joint) if link.joint in JOINTS else None
         own: dict[str, str] = {}
         if i is not None:
-            drive = boom.drives[i]
             numbers = {
-                "armature": (drive and reflected_inertia(drive)) or 0.0,
+                "armature": boom.drive_inertia[i],
                 "damping": boom.friction.viscous[i],
                 "frictionloss": boom.friction.coulomb[i],
             }
