@@ -29,19 +29,15 @@ from scipy.stats import chi2, f
 
 from boom_model import Basis, Boom, InfeasibleError, InputError, Origin
 from boom_model.arrays import Array, Mask, checked, read_only
-from boom_model.calibration import Calibration
+from boom_model.calibration import INNER, SCALE, UPPER, WIND_UPS, Calibration
+from boom_model.tip_uncertainty import printed_wind_up
 from planner.experiments.calibration_model import (
     BASE,
-    INNER,
-    SCALE,
     SIDEWAYS,
     TOLERANCE,
-    UPPER,
-    WIND_UPS,
     TipModel,
     aligned,
     candidates,
-    printed_wind_up,
     require_a_shape,
 )
 from planner.experiments.measurements import Measurements

@@ -101,12 +101,13 @@ def read_torque_log(path: str | Path, torque_per_ampere: ArrayLike | None = None
     return replace(log, tau=read_only(log.tau * checked("torque per ampere", torque_per_ampere, 5)))
 
 
-def readings_of(log: Log, cutoff: float | None = None) -> Readings:
+def readings_of(log: Log, cutoff: float | None = None, *, every_joint: bool = True) -> Readings:
     """Return a log's states and torques, with filtered positions and their derivatives.
 
     Args:
         log: positions and torques. Velocities and accelerations are used as given if both are there.
         cutoff: of the filter [Hz]. None selects the narrowest that removes noise alone.
+        every_joint: whether every joint must move, as a fit needs it.
 
     Raises:
         InputError: there are no torques or fewer than 40 samples, a gap is too long, a joint does not move, or the cut-off is
@@ -126,7 +127,8 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     even = evenly_sampled(log, LONGEST_GAP)
     tau, h = even.tau, float(even.t[-1] - even.t[0]) / (len(even.t) - 1)
     assert tau is not None
-    _require_motion(even.q)
+    if every_joint:
+        _require_motion(even.q)
     noise = np.maximum(_noise(even.q), _ROUNDING)
     if cutoff is not None and not 0.0 < cutoff < 0.5 / h:
         raise InputError(f"cutoff is {cutoff:g} Hz; it must be between 0 and {0.5 / h:g} Hz, half the log's sampling rate")

@@ -8,20 +8,15 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from boom_model import Basis, Boom, InfeasibleError, InputError, forward_kinematics, transmission_angle
+from boom_model.calibration import INNER, LENGTHS, OFFSETS, SCALE, UPPER, WIND_UPS
+from boom_model.tip_uncertainty import printed_wind_up
 from planner.experiments.calibration import calibrate, rms
 from planner.experiments.calibration_file import write_calibrated
 from planner.experiments.calibration_model import (
     BASE,
-    INNER,
-    LENGTHS,
-    OFFSETS,
-    SCALE,
-    UPPER,
-    WIND_UPS,
     Frame,
     TipModel,
     candidates,
-    printed_wind_up,
 )
 from planner.experiments.calibration_poses import suggest_poses
 from planner.experiments.comparison import Log, compare
