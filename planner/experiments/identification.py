@@ -185,13 +185,15 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
 
     Args:
         boom: the boom with the payload that it carried; its figures are the starting point.
-        logs: measured motions. The last HELD_OUT of each is kept for validation.
+        logs: measured motions, as the joints read; the boom's calibration is applied. The last
+            HELD_OUT of each is kept for validation.
         drive_inertia: whether the torques accelerate the drives' own inertia too, as those computed from motor currents do.
 
     Raises:
         InputError: the torques have the wrong sign, unit or side of the gearbox; the message says which.
         InfeasibleError: as `consistent_fit`.
     """
+    logs = [log.calibrated(boom) for log in logs]
     seen = [log.part(slice(0, round((1.0 - HELD_OUT) * len(log.t)))) for log in logs]
     kept = [log.part(slice(round((1.0 - HELD_OUT) * len(log.t)), None)) for log in logs]
     require_plausible_torques(boom, seen)

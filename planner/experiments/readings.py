@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import JOINTS, InputError
+from boom_model import JOINTS, Boom, InputError
 from boom_model.arrays import Array, Mask, checked, read_only
 from boom_model.boom import IS_LENGTH
 from planner.experiments.comparison import Log, evenly_sampled, read_log
@@ -75,6 +75,21 @@ class Readings:
         f = np.linspace(0.0, min(3.0 * self.cutoff, 0.5 / self.step), 600)
         gain = (2.0 * np.pi * f) ** 4 * np.sinc(f * block) ** 2 / (1.0 + (f / self.cutoff) ** (2 * _ORDER)) ** 2
         return np.asarray(2.0 * self.step * self.position_noise**2 * np.trapezoid(gain, f))
+
+    def calibrated(self, boom: Boom) -> "Readings":
+        """Return the joint positions in the place of readings, where the boom is calibrated."""
+        known = boom.calibration
+        if known is None:
+            return self
+        note = f"offsets and scale of the readings are applied: {known.origin.source}"
+        return replace(
+            self,
+            q=known.joint_positions(self.q),
+            qd=known.scale * self.qd,
+            qdd=known.scale * self.qdd,
+            position_noise=known.scale * self.position_noise,
+            notes=(*self.notes, note),
+        )
 
     def part(self, samples: slice) -> "Readings":
         """Return some of the samples."""
