@@ -62,11 +62,12 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     Example:
       boom export-model boom.urdf --payload 8
     """
-    from planner.exports.robot_models import write_model
+    from planner.exports.robot_models import left_out, write_model
 
     files, boom = outputs(out, inputs=(boom_file,)), load_boom(boom_file, payload)
     with files:
         write_model(boom, files.temporary(out))
+    print_lines("note", left_out(boom))
     click.echo(f"model: {out}")
     return 0
 

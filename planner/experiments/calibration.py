@@ -453,7 +453,10 @@ def _result(
     if (~fit.used).any():
         poses = np.flatnonzero(~fit.used)
         far = [f"{pose + 1} ({1e3 * float(np.linalg.norm(np.nan_to_num(fit.residuals[pose]))):.1f} mm)" for pose in poses]
-        notes.append(f"left out as bad targets: pose {', '.join(far)}; measure them again")
+        why = "measure them again"
+        if linkage == "equal":
+            why += ", or the links are not equal: --linkage auto asks the data"
+        notes.append(f"left out as bad targets: pose {', '.join(far)}; {why}")
     if chance is not None and linkage == "auto" and chance > _DOUBT:
         notes.append("the data do not tell the linkage from a parallelogram; equal links are kept")
     parameters = _parameters(start, fit, covariance)

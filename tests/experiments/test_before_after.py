@@ -15,12 +15,21 @@ from boom_model.arrays import Array, read_only
 from boom_model.boom import Friction
 from boom_model.boom_file import BOOM_FILE
 from boom_model.calibration import Calibration
+from boom_model.measured import measured_lines
+from boom_model.tip_uncertainty import printed_wind_up
+from planner import check
+from planner.checks.kinds import CheckKind
+from planner.experiments.calibration import calibrate
+from planner.experiments.calibration_file import write_calibrated
 from planner.experiments.comparison import Log
 from planner.experiments.excitation import random_excitation
 from planner.experiments.identification import identify
+from planner.experiments.measured_boom import write_identified
+from planner.experiments.measurements import Measurements
 from planner.experiments.readings import readings_of
 from planner.experiments.residuals import residuals
 from planner.recording import write_before_after_recording
+from tests.builders import main_move
 from tests.recordings import recorded_rows
 
 CAD = Boom.load().with_payload(0.0)
@@ -207,3 +216,48 @@ def test_a_mistake_is_named_in_one_line(boom, typed: str, said: str):
     code, out, err = boom("compare", *typed.split())
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert said in err
+
+
+def tips_of(boom: Boom, count: int = 26) -> Measurements:
+    """Measured tips of a boom whose offsets are OFFSET."""
+    rng = np.random.default_rng(6)
+    q = rng.uniform([0.0, 0.1, 0.0, 0.0, -1.5], [6.0, 1.2, 0.0, 1.0, 1.5], (count, 5))
+    q[:, 2] = q[:, 1] + rng.uniform(0.5, 1.9, count)
+    tip = forward_kinematics(boom, q - printed_wind_up(boom, q)).position + 2e-4 * rng.normal(size=(count, 3))
+    return Measurements.of(q - OFFSET, tip, 2e-4, name="tips.csv")
+
+
+@pytest.mark.parametrize("order", ["calibrate first", "identify first"])
+def test_both_measurements_go_into_one_file(tmp_path: Path, order: str):
+    first, both = tmp_path / "first.toml", tmp_path / "both.toml"
+    boom, tips = CAD, tips_of(truth())
+    if order == "calibrate first":
+        write_calibrated(calibrate(boom, tips, known_frame=True, linkage="equal"), first, None, None)
+        found = identify(Boom.load(first).with_payload(0.0), [readings_of(log(offset=1.0))])
+        write_identified(both, first, found, "log.csv")
+    else:
+        # without a calibration the masses take up the offsets
+        write_identified(first, None, identify(boom, [readings_of(log())]), "log.csv")
+        start = Boom.load(first).with_payload(0.0)
+        write_calibrated(calibrate(start, tips, known_frame=True, linkage="equal"), both, first, None)
+    made = Boom.load(both)
+    lines = measured_lines(made)
+    assert "lengths and zeros of the joints: boom calibrate tips.csv: 26 poses" in lines
+    assert "masses, friction: boom identify log.csv" in lines
+    found = residuals(CAD, made.with_payload(0.0), log(offset=1.0))
+    np.testing.assert_allclose(found.rms[1], NOISE, rtol=0.15)
+    report = check(made, main_move("cubic", step=0.05).trajectory)
+    assert report.measured == lines
+    (row,) = (row for row in report.rows if row.kind is CheckKind.TIP_GEOMETRY)
+    assert row.basis is Basis.MEASURED
+
+
+@pytest.mark.parametrize(
+    "typed", ["plan transport phenotyping", "mission table-2-4", "size table-2-4 --joint inner", "require table-2-4"]
+)
+def test_plans_missions_and_sizing_say_what_was_measured(boom, typed: str):
+    code, out, err = boom(*typed.split(), "--boom", "mine.toml")
+    assert (code, err) == (0, "")
+    assert "measured: friction: boom identify log.csv" in out
+    answer = json.loads(boom(*typed.split(), "--boom", "mine.toml", "--json")[1])
+    assert answer["measured"] == ["friction: boom identify log.csv"]
