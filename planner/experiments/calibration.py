@@ -40,6 +40,7 @@ from planner.experiments.calibration_model import (
     candidates,
     require_a_shape,
 )
+from planner.experiments.measurement_checks import require_plausible_tips, still_notes
 from planner.experiments.measurements import Measurements
 
 Linkage = Literal["auto", "equal", "unequal"]
@@ -205,6 +206,7 @@ def calibrate(
     if linkage == "equal" and not boom.geometry.is_parallelogram:
         equal = replace(boom.geometry, upper_less_lower=0.0, inner_less_outer=0.0)
         start = replace(start, boom=replace(boom, geometry=equal))
+    require_plausible_tips(measured, start, known_frame)
     if linkage != "equal":
         require_a_shape(start, measured.readings)
     names = {kind: _candidates(boom, known_frame, kind == "equal", fixed) for kind in ("equal", "unequal")}
@@ -448,7 +450,7 @@ def _chance(plain: _Fit, general: _Fit) -> float:
     more = general.freedom
     extra = max(len(general.names) - len(plain.names), 1)
     scale = (plain.sd / general.sd) ** 2  # both in the general fit's standard deviations
-    ratio = max(plain.square * scale - general.square, 0.0) / extra / (general.square / more)
+    ratio = max(plain.square * scale - general.square, 0.0) / extra / (max(general.square, np.finfo(float).tiny) / more)
     return float(f.sf(ratio, extra, more))
 
 
@@ -460,7 +462,7 @@ def _result(
     factor = fit.factor
     widened = factor if not stated or (doubt < _DOUBT and factor > 1.0) else 1.0
     covariance = fit.covariance * (widened / fit.sd) ** 2
-    notes = []
+    notes = list(still_notes(measured))
     if measured.by_distance.any():
         notes.append(
             f"{int(measured.by_distance.sum())} poses are measured by their distance: the error of that counts for them"

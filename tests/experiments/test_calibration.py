@@ -351,3 +351,39 @@ def test_a_wrong_tape_is_named(tmp_path, header, row, said):
     (tmp_path / "tape.csv").write_text(f"{header}\n{row}\n")
     with pytest.raises(InputError, match=said):
         read_measurements(tmp_path / "tape.csv")
+
+
+def slipped(change):
+    """Measurements of the shipped boom in another frame, with a slip."""
+    rng = np.random.default_rng(31)
+    q = poses(rng, 24)
+    R, t = Rotation.from_euler("xyz", [2.0, -1.0, 130.0], degrees=True).as_matrix(), np.array([3.0, 2.0, 0.4])
+    tip = forward_kinematics(BOOM, q - printed_wind_up(BOOM, q)).position @ R.T + t + NOISE * rng.normal(size=(24, 3))
+    return Measurements.of(*change(q, tip), NOISE, name="tips.csv")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda q, x: (q * [1, -1, 1, 1, 1], x), r"q2 \(inner\) looks turned round: multiply it by -1"),
+        (lambda q, x: (q[:, [0, 2, 1, 3, 4]], x), "look swapped"),
+        (lambda q, x: (q, np.roll(x, 1, axis=0)), "each tip looks like that of the row one earlier"),
+        (lambda q, x: (q, x * [1, -1, 1]), "multiply it by -1, or make the measuring frame right-handed"),
+        (lambda q, x: (q, x * 3.28084), "look like feet; they must be in m"),
+        (lambda q, x: (q, x[np.random.default_rng(1).permutation(len(x))]), "check the units, the signs of the joints"),
+    ],
+)
+def test_a_slip_is_named_instead_of_fitted(change, said):
+    with pytest.raises(InputError, match=said):
+        calibrate(BOOM, slipped(change))
+
+
+def test_a_joint_that_never_moves_is_named():
+    def fixed(q, x):
+        at = np.array(q)
+        at[:, 4] = 0.3
+        return at, forward_kinematics(BOOM, at - printed_wind_up(BOOM, at)).position
+
+    found = calibrate(BOOM, slipped(fixed), known_frame=True)
+    assert "wrist never moves (all at 17.19 deg): measure poses that differ in it, too (--suggest)" in found.notes
+    assert "wrist offset" not in found.free or "L8" not in found.free
