@@ -16,7 +16,6 @@ from planner.recording.palette import (
     LIMIT_COLOR,
     PART_COLORS,
     PAYLOAD_COLOR,
-    TOTAL_COLOR,
     VERMILION,
 )
 from planner.recording.plots import Bundle
@@ -100,5 +99,5 @@ def before_after_bundles(found: Residuals) -> dict[str, list[Bundle]]:
 def _tip(found: Residuals) -> Bundle:
     curves, names, colors = [found.apart], ["apart [mm]"], [PAYLOAD_COLOR]
     if found.after.tip_sd is not None:
-        curves, names, colors = [*curves, found.after.tip_sd], [*names, "sd after [mm]"], [*colors, TOTAL_COLOR]
+        curves, names, colors = [*curves, found.after.tip_sd], [*names, "sd after [mm]"], [*colors, AFTER_COLOR]
     return Bundle("plots/left/tip", "tips of the two models [mm]", names, colors, np.stack(curves, axis=-1) * 1e3)
