@@ -28,9 +28,10 @@ from planner.experiments.measured_boom import write_identified
 from planner.experiments.measurements import Measurements
 from planner.experiments.readings import readings_of
 from planner.experiments.residuals import residuals
+from planner.motion.trajectory import Trajectory, write_csv
 from planner.recording import write_before_after_recording
 from tests.builders import main_move
-from tests.recordings import recorded_rows
+from tests.recordings import recorded_entities, recorded_rows
 
 CAD = Boom.load().with_payload(0.0)
 NOISE = 0.5
@@ -261,3 +262,15 @@ def test_plans_missions_and_sizing_say_what_was_measured(boom, typed: str):
     assert "measured: friction: boom identify log.csv" in out
     answer = json.loads(boom(*typed.split(), "--boom", "mine.toml", "--json")[1])
     assert answer["measured"] == ["friction: boom identify log.csv"]
+
+
+def test_with_a_plan_both_comparisons_are_shown(boom, tmp_path: Path):
+    t, q, qd, qdd = motion()
+    write_csv(Trajectory.from_samples(t, q, qd, qdd), tmp_path / "plan.csv")
+    code, out, err = boom("compare", "plan.csv", "log.csv", "--after", "mine.toml", "--payload", "0", "--out", "all.rrd")
+    assert (code, err) == (0, "")
+    assert "tip error at most" in out
+    assert "mine.toml explains the torques of 5 of 5 joints better" in " ".join(out.split())
+    assert len(out.splitlines()) <= 24
+    entities = recorded_entities(tmp_path / "all.rrd")
+    assert {"/plots/error/inner", "/plots/left/inner", "/plots/parts/inner"} <= entities
