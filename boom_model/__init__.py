@@ -7,8 +7,9 @@ the boom and of the catalogue.
 from boom_model.boom import JOINTS, Body, Boom, Friction, Geometry, Limits, Mount
 from boom_model.drives.catalogue import Catalogue
 from boom_model.drives.drive import Drive, Gearbox, Motor, Winding, Wiring, mesh_efficiency
-from boom_model.drives.gear_compliance import TipDeflection, gear_frequencies, tip_deflection, wind_up
+from boom_model.drives.gear_compliance import TipDeflection, gear_frequencies, tip_deflection
 from boom_model.drives.linear_actuator import LinearActuator, LinearDrive, screw_torque
+from boom_model.drives.wind_up import wind_up
 from boom_model.dynamics.base_motion import BaseMotion, up_on_slope
 from boom_model.dynamics.equations_of_motion import (
     forward_dynamics,
@@ -58,6 +59,7 @@ from boom_model.kinematics.inverse import (
 )
 from boom_model.kinematics.reach import NearestReachable, ReachMap, nearest_reachable, reach_map
 from boom_model.provenance import Basis, Origin, Sourced
+from boom_model.tip_uncertainty import tip_covariance, tip_deviation
 
 __all__ = [
     "JOINTS",
@@ -131,7 +133,9 @@ __all__ = [
     "reach_map",
     "screw_torque",
     "solve_branches",
+    "tip_covariance",
     "tip_deflection",
+    "tip_deviation",
     "transmission_angle",
     "up_on_slope",
     "velocity_torque",

@@ -1,6 +1,6 @@
 """The boom: geometry, bodies, joint limits, payload and drives as frozen data."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.calibration import Calibration
-from boom_model.drives.drive import Drive
+from boom_model.drives.drive import Drive, reflected_inertia
 from boom_model.drives.linear_actuator import LinearDrive
 from boom_model.errors import InputError
+from boom_model.joints import JOINTS as JOINTS
 from boom_model.keep_out import KeepOut
 from boom_model.plausible import (
     ACCELERATION,
@@ -22,6 +23,7 @@ from boom_model.plausible import (
     ANGULAR_JERK,
     ANGULAR_VELOCITY,
     COULOMB_FRICTION,
+    DRIVE_INERTIA,
     GRAVITY,
     INERTIA,
     JERK,
@@ -38,9 +40,6 @@ from boom_model.plausible import (
 )
 from boom_model.provenance import Origin, Sourced
 from boom_model.words import unknown
-
-JOINTS = ("yaw", "inner", "lower", "extension", "wrist")
-"""Joint names, in the order of q: theta1 .. theta5 of the thesis."""
 
 IS_LENGTH = read_only([0, 0, 0, 1, 0]).astype(bool)
 """True where a joint coordinate is a length [m] and not an angle [rad]."""
@@ -293,6 +292,11 @@ class Boom:
     """Shapes to avoid; None if not given."""
     calibration: Calibration | None = None
     """Offsets of the joint readings and uncertainty; None where the machine was not measured."""
+    rotors: tuple[Sourced[float] | None, ...] = (None,) * 5
+    """Measured inertia, at the joint, of a drive without data [kg m^2, the extension's kg].
+
+    A drive with data holds its own.
+    """
 
     def __post_init__(self) -> None:
         GRAVITY.require("gravity", scalar("gravity", self.gravity))
@@ -368,8 +372,29 @@ class Boom:
         if isinstance(drive, LinearDrive):
             if not IS_LENGTH[JOINTS.index(joint)]:
                 raise InputError(f"{joint} turns; a linear actuator drives the extension only")
-            return replace(self, actuator=drive)
-        return replace(self, drives=tuple(drive if name == joint else d for name, d in zip(JOINTS, self.drives, strict=True)))
+            return replace(self, actuator=drive, rotors=(*self.rotors[:3], None, self.rotors[4]))
+        rotors = tuple(None if name == joint else rotor for name, rotor in zip(JOINTS, self.rotors, strict=True))
+        drives = tuple(drive if name == joint else d for name, d in zip(JOINTS, self.drives, strict=True))
+        return replace(self, drives=drives, rotors=rotors)
+
+    def with_drive_inertia(self, measured: Sequence[Sourced[float]]) -> "Boom":
+        """Return the boom with the measured inertia of each drive at its joint [kg m^2, the extension's kg].
+
+        Raises:
+            InputError: an inertia is not plausible.
+        """
+        for joint, inertia in zip(JOINTS, measured, strict=True):
+            DRIVE_INERTIA.require(f"drive inertia of {joint}", scalar(f"drive inertia of {joint}", inertia.value))
+        drives = tuple(None if d is None else replace(d, inertia=m) for d, m in zip(self.drives, measured, strict=True))
+        rotors = tuple(m if d is None else None for d, m in zip(self.drives, measured, strict=True))
+        return replace(self, drives=drives, rotors=rotors)
+
+    @cached_property
+    def drive_inertia(self) -> Array:
+        """Inertia of each drive at its joint (5,) [kg m^2, the extension's kg]; 0 where it is unknown."""
+        known = [reflected_inertia(drive) if drive is not None else rotor and rotor.value
+                 for drive, rotor in zip(self.drives, self.rotors, strict=True)]  # fmt: skip
+        return read_only([inertia or 0.0 for inertia in known])
 
     def pose(self, name: str) -> Array:
         """Return a named pose, (5,).

@@ -25,6 +25,7 @@ from boom_model.plausible import (
     ANGULAR_VELOCITY,
     CLEARANCE,
     COULOMB_FRICTION,
+    DRIVE_INERTIA,
     GRAVITY,
     INERTIA,
     JERK,
@@ -58,6 +59,7 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 _Spread = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _Factor = Annotated[float, Field(ge=-10, le=100, allow_inf_nan=False)]
 _Scale = Annotated[float, Field(ge=0.5, le=2, allow_inf_nan=False)]
+_Inertia = Annotated[float, DRIVE_INERTIA]
 _Coulomb = Annotated[float, COULOMB_FRICTION]
 _Asymmetric = Annotated[float, Field(ge=-COULOMB_FRICTION.high, le=COULOMB_FRICTION.high, allow_inf_nan=False)]
 
@@ -217,6 +219,12 @@ class _RevoluteTable(Table):
     jerk_deg_s3: _Sourced[Annotated[float, ANGULAR_JERK]]
     friction: _RevoluteFriction | None = None
     drive: _DriveTable | None = None
+    drive_inertia_kg_m2: _Sourced[_Inertia] | None = None
+
+    @property
+    def rotor(self) -> Sourced[float] | None:
+        """Measured inertia of the drive at the joint."""
+        return _given(self.drive_inertia_kg_m2)
 
     @property
     def rows(self) -> tuple[_Range, _Sourced[float], _Sourced[float], _Sourced[float], float]:
@@ -232,6 +240,12 @@ class _PrismaticTable(Table):
     jerk_m_s3: _Sourced[Annotated[float, JERK]]
     friction: _PrismaticFriction | None = None
     actuator: _ActuatorTable | None = None
+    drive_inertia_kg: _Sourced[_Inertia] | None = None
+
+    @property
+    def rotor(self) -> Sourced[float] | None:
+        """Measured mass of the drive at the joint."""
+        return _given(self.drive_inertia_kg)
 
     @property
     def rows(self) -> tuple[_Range, _Sourced[float], _Sourced[float], _Sourced[float], float]:
@@ -405,13 +419,14 @@ def _boom(file: str, table: _BoomTable, known: Catalogue, searched: str) -> Boom
         mount=Mount(_given(table.mount.force_N), _given(table.mount.moment_Nm)),
         limits=limits,
         drives=tuple(
-            _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), known, searched)
+            _drive(file, f"joints.{name}.drive", getattr(joint, "drive", None), joint.rotor, known, searched)
             for name, joint in zip(JOINTS, joints, strict=True)
         ),
         actuator=_linear_drive(file, table.joints.extension.actuator, known, searched),
         poses=MappingProxyType(poses),
         keep_out=None if table.keep_out is None else _keep_out(table.keep_out),
         calibration=None if table.calibration is None else table.calibration.calibration,
+        rotors=tuple(joint.rotor if getattr(joint, "drive", None) is None else None for joint in joints),
     )
 
 
@@ -456,7 +471,9 @@ def _limits(joints: list[Any], linkage: _LinkageTable) -> Limits:
     )
 
 
-def _drive(file: str, key: str, table: _DriveTable | None, known: Catalogue, searched: str) -> Drive | None:
+def _drive(
+    file: str, key: str, table: _DriveTable | None, inertia: Sourced[float] | None, known: Catalogue, searched: str
+) -> Drive | None:
     if table is None:
         return None
     for kind, name, entries in (("motor", table.motor, known.motors), ("gearbox", table.gearbox, known.gearboxes)):
@@ -474,6 +491,7 @@ def _drive(file: str, key: str, table: _DriveTable | None, known: Catalogue, sea
         bus_voltage=_given(voltage),
         wiring=None if wiring is None else Sourced(Wiring(wiring.value), wiring.origin),
         brake=_given(table.brake),
+        inertia=inertia,
     )
 
 

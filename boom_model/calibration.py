@@ -7,7 +7,17 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, checked
 from boom_model.errors import InputError
+from boom_model.joints import JOINTS
 from boom_model.provenance import Origin
+from boom_model.words import unknown
+
+UPPER, INNER = "L5 - L3", "L9 - L4"
+LENGTHS = ("L1", "L2", "L3", "L4", "L6", "L7", "L8", UPPER, INNER)
+OFFSETS = tuple(f"{joint} offset" for joint in JOINTS)
+SCALE = "extension scale"
+WIND_UPS = tuple(f"{joint} wind-up" for joint in JOINTS)
+PARAMETERS = (*LENGTHS, *OFFSETS, SCALE, *WIND_UPS)
+"""Figures that a calibration can measure: lengths [m], offsets of the readings [rad, m], shares of 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +46,9 @@ class Calibration:
             if checked(f"calibration {name}", getattr(self, name)).shape != (5,):
                 raise InputError(f"calibration {name} has shape {getattr(self, name).shape}; it must be (5,)")
         count = len(self.parameters)
+        for name in self.parameters:
+            if name not in PARAMETERS:
+                raise unknown("calibration parameter", name, PARAMETERS)
         if checked("calibration covariance", self.covariance).shape != (count, count):
             raise InputError(
                 f"calibration covariance has shape {self.covariance.shape}; for {count} parameters it must be {(count, count)}"

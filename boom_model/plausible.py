@@ -148,6 +148,8 @@ INDUCTANCE = Range(1e-4, 1e4, "mH")
 VOLTAGE = Range(0.1, 1e3, "V")
 ROTOR_INERTIA = Range(1e-4, 1e4, "kg cm^2")
 INPUT_INERTIA = Range(1e-9, 1.0, "kg m^2")
+DRIVE_INERTIA = Range(1e-6, 1e5, "kg m^2")
+"""At the joint; the extension's is a mass in kg."""
 STIFFNESS = Range(1e-3, 1e4, "Nm/mrad")
 """1e4 is several times the largest strain-wave gearbox; a figure in Nm/rad is mostly beyond."""
 PLAY = Range(1e-6, 100.0, "mrad")

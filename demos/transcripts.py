@@ -65,16 +65,30 @@ PAGES = {
         ),
     ),
     "answers-field": (
-        "Answers in the field",
+        "Answers about row scans",
         (
-            "boom plots demos/field/trial.toml",
             "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic",
             "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic --speed 0.5 --mission scan.toml",
             "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic --speed 0.5 --passes 1",
             "boom mission scan.toml",
         ),
     ),
+    "answers-machine": (
+        "Answers about a measured machine",
+        (
+            "boom calibrate measured.csv --sd 0.0005 --check others.csv --out calibrated.toml",
+            "boom identify excited.csv --payload 0 --out identified.toml",
+            "boom calibrate measured.csv --sd 0.0005 --boom identified.toml --out mine.toml",
+            "boom info --boom mine.toml",
+            "boom new cad.toml",
+            "boom compare excited.csv --payload 0 --boom identified.toml --before cad.toml --report better.pdf",
+            "boom fk phenotyping --boom calibrated.toml",
+            "boom plan transport phenotyping --boom identified.toml",
+        ),
+    ),
 }
+DEMOS = {"answers-machine": ("10_calibrate_a_machine.py", "11_identify_the_dynamics.py")}
+"""Scripts that write the files of a page."""
 
 
 def main() -> int:
@@ -84,6 +98,10 @@ def main() -> int:
         shutil.copytree(GUIDE.parent / "field", Path(folder) / "demos" / "field")
         for name, (title, commands) in PAGES.items():
             parts = [f"# {title}\n", INTRODUCTION]
+            for script in DEMOS.get(name, ()):
+                subprocess.run(
+                    [sys.executable, GUIDE.parent / script], cwd=folder, env=_environment(), check=True, capture_output=True
+                )
             for command in commands:
                 answer = run(command, folder)
                 if len(answer.splitlines()) > LONGEST:
@@ -100,13 +118,19 @@ def main() -> int:
 
 def run(command: str, folder: str) -> str:
     """Return what a command prints in a folder, without spaces at the ends of lines."""
-    environment = os.environ | {"COLUMNS": str(WIDTH), "NO_COLOR": "1"}
-    environment["PYTHONPATH"] = os.pathsep.join([str(GUIDE.parents[1]), environment.get("PYTHONPATH", "")])
     arguments = [sys.executable, "-m", "planner", *command.split()[1:]]
-    done = subprocess.run(arguments, cwd=folder, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    done = subprocess.run(
+        arguments, cwd=folder, env=_environment(), text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
     if done.returncode > 1:
         raise SystemExit(f"{command}: exit {done.returncode}: {done.stdout}")
     return "".join(f"{line.rstrip()}\n" for line in done.stdout.splitlines())
+
+
+def _environment() -> dict[str, str]:
+    environment = os.environ | {"COLUMNS": str(WIDTH), "NO_COLOR": "1"}
+    environment["PYTHONPATH"] = os.pathsep.join([str(GUIDE.parents[1]), environment.get("PYTHONPATH", "")])
+    return environment
 
 
 def words(text: str) -> str:

@@ -15,6 +15,7 @@ from boom_model.boom import LOAD_UNITS
 from boom_model.drives.drive import drive_torque_limit
 from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.kinematics.constraints import Constraint
+from boom_model.measured import measured_lines
 from planner.checks.certificate import certificate_of
 from planner.checks.drives.duty import Duty
 from planner.checks.energy import energy_of
@@ -334,6 +335,7 @@ def _move(evaluation: Evaluation, trajectory: Trajectory, profile: str, duty: Du
         peaks=_peaks(evaluation),
         certificate=certificate_of(evaluation),
         energy=energy_of(evaluation) if duty is None else None,
+        measured=measured_lines(evaluation.boom),
     )
     return Move(profile, trajectory, evaluation, report)
 

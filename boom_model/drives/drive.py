@@ -112,6 +112,8 @@ class Drive:
     wiring: Sourced[Wiring] | None
     brake: Sourced[bool] | None = None
     """Whether a brake holds the joint without power; None if unknown."""
+    inertia: Sourced[float] | None = None
+    """Measured inertia of motor and gearbox at the joint [kg m^2]; None is that of the datasheets."""
 
     @property
     def winding(self) -> Winding | None:
@@ -127,7 +129,12 @@ class Drive:
 
 
 def reflected_inertia(drive: Drive) -> float | None:
-    """Return N^2 (J_rotor + J_gear) [kg m^2] at the joint, or None if an inertia is missing."""
+    """Return the drive's inertia at the joint [kg m^2], or None if it is unknown.
+
+    It is the measured one, or else N^2 (J_rotor + J_gear) of the datasheets.
+    """
+    if drive.inertia is not None:
+        return drive.inertia.value
     rotor, gear = drive.motor.rotor_inertia, drive.gearbox.input_inertia
     if rotor is None or gear is None:
         return None

@@ -1,4 +1,4 @@
-"""Wind-up of strain-wave gearboxes under torque, and the resulting deflection of the tip."""
+"""Deflection of the tip through the gearboxes, and what a calibration leaves uncertain of it."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -8,33 +8,18 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, Mask, broadcast
 from boom_model.boom import JOINTS, Boom
-from boom_model.drives.drive import Drive, Gearbox
+from boom_model.drives.drive import Drive
+from boom_model.drives.wind_up import wind_up
 from boom_model.kinematics.forward import jacobian
+from boom_model.tip_uncertainty import tip_deviation
 
-
-def wind_up(gearbox: Gearbox, torque: ArrayLike) -> Array | None:
-    """Return the angle [rad] by which the output lags the input under a torque [Nm].
-
-        |T| <= T1:       T / K1
-        T1 < |T| <= T2:  T1 / K1 + (T - T1) / K2
-        |T| > T2:        T1 / K1 + (T2 - T1) / K2 + (T - T2) / K3
-
-    The angle has the sign and the shape of the torque. This is the makers' curve of three linear
-    pieces (thesis, Appendix E, "Torsional Stiffness"). Return None if the curve is not printed.
-    """
-    if gearbox.torsion_torques is None or gearbox.torsion_stiffness is None:
-        return None
-    (T1, T2), (K1, K2, K3) = gearbox.torsion_torques, gearbox.torsion_stiffness
-    signed = np.asarray(torque, dtype=float)
-    size = np.abs(signed)
-    angle = np.minimum(size, T1) / K1 + np.clip(size - T1, 0.0, T2 - T1) / K2 + np.maximum(size - T2, 0.0) / K3
-    result: Array = np.copysign(angle, signed)
-    return result
+SURE = 2.0
+"""Standard deviations of the geometry that count in the total: at least 95 % of the errors are within."""
 
 
 @dataclass(frozen=True, eq=False)
 class TipDeflection:
-    """Deviation of the tip from the rigid model, caused by the drives of the joints alone."""
+    """Deviation of the tip from the rigid model: by the drives of the joints, and by what a calibration left open."""
 
     wind_up: Array
     """(..., 3) displacement of the tip in frame 1 by the wind-up of the gearboxes [m]."""
@@ -44,22 +29,25 @@ class TipDeflection:
     """(...) largest displacement of the tip by the hysteresis of the gearboxes [m]."""
     step: Array
     """(...) largest displacement of the tip by the microstep error of the motors [m]."""
+    geometry: Array
+    """(...) standard deviation of the tip by the calibrated figures [m]; 0 if the boom is not calibrated."""
     uncounted: tuple[str, ...]
     """What is left out because data is missing, one phrase each."""
 
     @property
     def total(self) -> Array:
-        """(...) largest total displacement [m]: the sum of the magnitudes of all parts."""
+        """(...) largest total displacement [m]: the sum of the magnitudes of all parts, of the geometry SURE times."""
         size: Array = np.linalg.norm(self.wind_up, axis=-1)
-        return size + self.backlash + self.hysteresis + self.step
+        return size + self.backlash + self.hysteresis + self.step + SURE * self.geometry
 
 
 def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
     """Return the displacement of the tip under joint torques (..., 5) [Nm].
 
     It is d = J_v dq, to first order. A gearbox yields to the load that its torque balances: dq_i =
-    -wind_up(tau_i). Backlash, hysteresis and microstep error are widths of unknown sign: each
-    displacement is the largest |sum_i +-J_v,i b_i| over all signs.
+    -c_i wind_up(tau_i), with the share c_i that a calibration has measured, else 1. Backlash,
+    hysteresis and microstep error are widths of unknown sign: each displacement is the largest
+    |sum_i +-J_v,i b_i| over all signs.
 
     Raises:
         InputError: q or tau is not finite or not (..., 5), or they do not broadcast.
@@ -68,21 +56,26 @@ def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
     J = jacobian(boom, q)[..., :3, :]
     yields = np.zeros(tau.shape)
     widths = {"backlash": np.zeros(5), "hysteresis": np.zeros(5), "step": np.zeros(5)}
-    uncounted = []
+    uncounted, share = [], np.ones(5) if boom.calibration is None else boom.calibration.wind_up
     for i, drive in enumerate(boom.drives):
         if drive is None:
             uncounted.append(f"{JOINTS[i]}: no drive data")
             continue
         angle = wind_up(drive.gearbox, tau[..., i])
         if angle is not None:
-            yields[..., i] = -angle
+            yields[..., i] = -share[i] * angle
         known = {"wind-up": angle, "backlash": drive.gearbox.backlash, "hysteresis": drive.gearbox.hysteresis}
         known["microstep error"] = step = _step_error(drive)
         uncounted += [f"{JOINTS[i]}: no {name} is printed" for name, value in known.items() if value is None]
         for name, value in zip(widths, (drive.gearbox.backlash, drive.gearbox.hysteresis, step), strict=True):
             widths[name][i] = value or 0.0
     moved = sum((J[..., i] * yields[..., i, None] for i, drive in enumerate(boom.drives) if drive), np.zeros(J.shape[:-1]))
-    return TipDeflection(moved, **{name: _worst(J, width) for name, width in widths.items()}, uncounted=tuple(uncounted))
+    sd = tip_deviation(boom, q, tau)
+    geometry = np.zeros(J.shape[:-2]) if sd is None else sd
+    if np.isnan(geometry).any():
+        uncounted.append("geometry, where the linkage is flat")
+    counted = {name: _worst(J, width) for name, width in widths.items()}
+    return TipDeflection(moved, **counted, geometry=np.nan_to_num(geometry), uncounted=tuple(uncounted))
 
 
 def gear_stiffness(drives: tuple[Drive | None, ...]) -> tuple[Array, Mask]:

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, broadcast, checked
 from boom_model.boom import Boom
-from boom_model.drives.drive import reflected_inertia
 from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.dynamics.closed_form import mass_and_bias, mass_forms
 from boom_model.dynamics.newton_euler import BASE_ENTRIES, inverse_dynamics, matched
@@ -162,7 +161,7 @@ def _columns(boom: Boom, q: Array) -> Array:
 
 
 def _drive_inertia(boom: Boom) -> Array:
-    return np.diag([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives])
+    return np.diag(boom.drive_inertia)
 
 
 def _falling(boom: Boom) -> BaseMotion:

@@ -28,7 +28,6 @@ from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, broadcast, checked, read_only
 from boom_model.boom import Body, Boom
-from boom_model.drives.drive import reflected_inertia
 from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.dynamics.virtual_work import balance
 from boom_model.errors import InputError
@@ -133,7 +132,7 @@ def inverse_dynamics(
         np.empty((count, 6)) if reactions else None,
     )
     model = regrouped(boom, payload_as) if boom.geometry.is_parallelogram else None
-    rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) if drive_inertia else None
+    rotors = boom.drive_inertia if drive_inertia else None
 
     def fill(motion: list[Array], outside: list[Array], push: Array | None, twist: Array | None, out: _Outputs) -> None:
         if model is None:

@@ -203,6 +203,8 @@ class CheckKind(StrEnum):
     TIP_BACKLASH = "backlash", Part.TIP, Quantity.DEFLECTION, Severity.INFORMATION
     TIP_HYSTERESIS = "hysteresis", Part.TIP, Quantity.DEFLECTION, Severity.INFORMATION
     TIP_STEP_ERROR = "step error", Part.TIP, Quantity.DEFLECTION, Severity.INFORMATION
+    TIP_GEOMETRY = "geometry, 1 sd", Part.TIP, Quantity.DEFLECTION, Severity.INFORMATION
+    """Standard deviation by the calibration's covariance."""
     TIP_DEFLECTION = "deflection in all", Part.TIP, Quantity.DEFLECTION
     """INFO if no tolerance is given."""
     TIP_FREQUENCY = "first frequency", Part.TIP, Quantity.FREQUENCY, Severity.INFORMATION

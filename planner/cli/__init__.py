@@ -13,6 +13,7 @@ import click
 
 from boom_model import InputError
 from planner.cli import (
+    compare,
     control,
     data,
     drives,
@@ -120,7 +121,7 @@ for _command in (
     link.link,
     files.export,
     files.export_model,
-    files.compare,
+    compare.compare,
     experiments.calibrate,
     identify.identify,
     files.validate,

@@ -10,6 +10,7 @@ import numpy as np
 
 from boom_model import JOINTS, Boom, Catalogue, Drive, forward_kinematics
 from boom_model.boom import IS_LENGTH
+from boom_model.measured import measured_lines
 from boom_model.provenance import Basis, Origin
 from planner.cli.completion import OutFile
 from planner.cli.options import boom_option, given_catalogue, json_option, load_boom, outputs
@@ -116,10 +117,9 @@ def new(out: str) -> int:
 
 
 def _measured(boom: Boom) -> Iterable[str]:
-    """Return what a calibration has measured."""
+    """Return what was measured on the machine."""
     g = boom.geometry
-    if boom.calibration is not None:
-        yield f"lengths and zeros of the joints: {boom.calibration.origin.source}"
+    yield from measured_lines(boom)
     if not g.is_parallelogram:
         yield f"unequal links: L5 - L3 {g.upper_less_lower * 1e3:+.2f} mm, L9 - L4 {g.inner_less_outer * 1e3:+.2f} mm"
 
@@ -168,6 +168,7 @@ def _info(boom: Boom) -> dict[str, Any]:
         "payload_kg": boom.payload.mass,
         "moving_mass_kg": _moving(boom),
         "linkage_rad": boom.limits.linkage,
+        "measured": list(measured_lines(boom)),
         "calibration": None if boom.calibration is None else _origin(boom.calibration.origin),
         "joints": [
             {

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boom_model import Boom, InfeasibleError, InputError
+from boom_model.measured import measured_lines
 from boom_model.plausible import VOLTAGE
 from planner.cli.completion import OneOf, OutFile, joints, missions
 from planner.cli.options import (
@@ -231,10 +232,11 @@ def size(
     written = with_names({"report": document})
     _write_sizing(files, boom, asked, choices, notes, document)
     if as_json:
-        print_json(sizing_json(asked.name, choices, notes) | {"files": written})
+        print_json(sizing_json(asked.name, choices, notes) | {"measured": list(measured_lines(boom)), "files": written})
     else:
         print_lines(None, [f"mission {asked.name}, payload {boom.payload.mass:g} kg"])
         _print_choices(choices, notes, whole)
+        print_lines("measured", measured_lines(boom))
         print_files(written)
         print_lines("next", [] if whole else [f"boom size {mission} --report drives.pdf"])
     unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]

@@ -1,23 +1,17 @@
-"""The commands that convert and compare motions, export models, and validate the model."""
-
-from typing import Any
+"""The commands that convert motions, export models, and validate the model."""
 
 import click
 
-from boom_model import Boom, InputError
-from boom_model.plausible import TIME, TIP_ERROR, WINDOW
-from planner.cli.completion import OutFile
+from boom_model import Boom
 from planner.cli.options import (
     all_option,
     boom_option,
     json_option,
     load_boom,
     outputs,
-    payload_as_option,
     payload_option,
-    plausible,
 )
-from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows
+from planner.cli.printing import ANSWER_IS_NO, complain, print_json, print_lines, print_rows
 
 
 @click.command()
@@ -68,112 +62,14 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
     Example:
       boom export-model boom.urdf --payload 8
     """
-    from planner.exports.robot_models import write_model
+    from planner.exports.robot_models import left_out, write_model
 
     files, boom = outputs(out, inputs=(boom_file,)), load_boom(boom_file, payload)
     with files:
         write_model(boom, files.temporary(out))
+    print_lines("note", left_out(boom))
     click.echo(f"model: {out}")
     return 0
-
-
-@click.command(context_settings={"ignore_unknown_options": True})  # so that --offset takes -0.5
-@click.argument("planned", metavar="PLANNED")
-@click.argument("measured", metavar="MEASURED")
-@click.option(
-    "--offset", default="0", show_default=True, metavar="S|best",
-    help="Time added to the log. best fits it to the plan, which hides a delay of the drives.",
-)  # fmt: skip
-@click.option(
-    "--window",
-    type=float,
-    callback=plausible(WINDOW),
-    metavar="S",
-    help="Width of the filter that differentiates the log. Default: 0.2 s.",
-)
-@click.option(
-    "--tolerance",
-    type=float,
-    callback=plausible(TIP_ERROR),
-    metavar="M",
-    help="Largest allowed tip error.",
-)
-@click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording of both for `boom view`.")
-@click.option(
-    "--after", type=click.Path(), metavar="FILE.toml", help="The boom as identified: the log's torques before and after."
-)
-@payload_option
-@payload_as_option
-@boom_option
-@all_option
-@json_option
-def compare(
-    planned: str,
-    measured: str,
-    offset: str,
-    window: float | None,
-    tolerance: float | None,
-    out: str | None,
-    after: str | None,
-    payload: float | None,
-    payload_as: Any,
-    boom_file: str | None,
-    whole: bool,
-    as_json: bool,
-) -> int:
-    """Compare a measured motion with its plan: joints, tip and torques.
-
-    PLANNED and MEASURED are CSV or Parquet files. MEASURED has the columns t and q1..q5 in SI, and
-    optionally qd1..qd5, qdd1..qdd5 and tau1..tau5. A Savitzky-Golay filter computes missing
-    derivatives; their noise is reported.
-
-    \b
-    Example:
-      boom compare move.csv log.csv --offset best --out both.rrd
-    """
-    from planner.experiments.comparison import WINDOW as USUAL_WINDOW
-    from planner.experiments.comparison import compare as compare_motions
-    from planner.experiments.comparison import read_log
-    from planner.motion.motion_files import read_motion
-
-    try:
-        shift = None if offset == "best" else float(offset)
-    except ValueError:
-        raise InputError(f"offset {offset!r} is neither a number of seconds nor best") from None
-    if shift is not None:
-        TIME.require("offset", shift)
-    files = outputs(out, inputs=(planned, measured, boom_file, after))
-    found = compare_motions(
-        load_boom(boom_file, payload),
-        read_motion(planned),
-        read_log(measured),
-        offset=shift,
-        window=USUAL_WINDOW if window is None else window,
-        payload_as=payload_as,
-        after=None if after is None else load_boom(after, payload),
-    )
-    written = {}
-    if out is not None:
-        from planner.recording import write_comparison_recording
-
-        with files:
-            write_comparison_recording(files.temporary(out), found)
-        written["recording"] = out
-    answer = found.to_json(written)
-    peak = answer["tip"]["peak_m"]
-    failed = tolerance is not None and peak > tolerance
-    answer |= {"tolerance_m": tolerance, "verdict": None if tolerance is None else "FAIL" if failed else "PASS"}
-    words = "" if tolerance is None else f"tip error {peak * 1e3:.2f} mm of {tolerance * 1e3:g} mm"
-    if as_json:
-        print_json(answer)
-    else:
-        times = f"{answer['samples']} samples from {answer['from_s']:.3f} to {answer['to_s']:.3f} s"
-        _print_comparison(
-            answer, f"{measured} against {planned}, {times}", f"{answer['verdict']}: {words}" if words else None, whole
-        )
-    if failed:
-        complain(words)
-    return ANSWER_IS_NO if failed else 0
 
 
 @click.command()
@@ -205,30 +101,3 @@ def validate(whole: bool, as_json: bool) -> int:
     if failed:
         complain(f"{failed} of {len(rows)} rows do not hold")
     return ANSWER_IS_NO if failed else 0
-
-
-def _print_comparison(answer: dict[str, Any], asked: str, verdict: str | None, whole: bool) -> None:
-    from planner.experiments import comparison
-
-    print_lines(None, [asked, *([] if verdict is None else [verdict])])
-    print_lines(None, comparison.summary(answer))
-    print_rows(comparison.ANSWER_HEADER, map(comparison.answer_cells, answer["joints"]), drop=("RMS", "at"))
-    if answer["joints"][0]["torque"]["parts_after"] is not None:
-        if answer["joints"][0]["torque"]["logged_less_after"] is not None:
-            click.echo("Torques of the log less the model's, before and after identification, RMS")
-            print_rows(comparison.AFTER_HEADER, map(comparison.after_cells, answer["joints"]))
-        if whole:
-            click.echo("Parts of the model's torques, before and after identification, RMS")
-            print_rows(comparison.PARTS_HEADER, map(comparison.part_cells, answer["joints"]))
-    if whole:
-        for title, header, cells in (
-            ("Positions, measured minus planned", comparison.POSITION_HEADER, comparison.position_cells),
-            ("Torques of the measured motion minus those of the plan", comparison.TORQUE_HEADER, comparison.torque_cells),
-            ("Torques of the log minus those of the model", comparison.LOGGED_HEADER, comparison.logged_cells),
-        ):
-            click.echo(title)
-            print_rows(header, map(cells, answer["joints"]))
-        print_lines("note", answer["notes"])
-    else:
-        print_lines(None, [f"{len(answer['notes'])} notes, noise, means: --all lists them"])
-    print_files(answer["files"])

@@ -186,7 +186,7 @@ def _print_dynamics(answer: dict[str, Any], logs: str, payload: float, whole: bo
         print_lines(None, [f"{len(answer['notes'])} notes, every parameter with its interval: --all lists them"])
     print_files(answer["files"])
     if "boom" in answer["files"]:
-        print_lines("next", [f"boom compare PLAN.csv LOG.csv --after {answer['files']['boom']}"])
+        print_lines("next", [f"boom compare LOG.csv --payload {payload:g} --after {answer['files']['boom']}"])
 
 
 def _cells(parameters: list[dict[str, Any]]) -> list[tuple[str, ...]]:

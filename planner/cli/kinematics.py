@@ -13,6 +13,7 @@ from boom_model import (
     forward_kinematics,
     gravity_torque,
     inverse_kinematics,
+    tip_covariance,
     transmission_angle,
 )
 from boom_model.boom import IS_LENGTH, LOAD_UNITS, in_degrees
@@ -100,12 +101,14 @@ def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
         raise InputError(f"{joints}: a tip target has no joint position yet; boom ik X Y Z finds those that reach it")
     q = boom.pose(target) if isinstance(target, str) else np.asarray(target)
     tip, tau = forward_kinematics(boom, q), np.round(gravity_torque(boom, q), 9) + 0.0
-    reasons = boom.limits.reasons(q)
+    reasons, covariance = boom.limits.reasons(q), tip_covariance(boom, q)
+    spread = None if covariance is None or np.isnan(covariance).any() else np.sqrt(np.diag(covariance))
     if as_json:
         print_json(
             {
                 "q": q.tolist(),
                 "position_m": tip.position.tolist(),
+                "position_sd_m": None if spread is None else spread.tolist(),
                 "pitch_rad": float(tip.pitch),
                 "transmission_angle_rad": float(transmission_angle(q)),
                 "gravity_torque": tau.tolist(),
@@ -116,6 +119,9 @@ def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
         return 0
     x, y, z = tip.position
     click.echo(f"tip at x {x:.4f} m, y {y:.4f} m, z {z:.4f} m, pitch {np.degrees(tip.pitch):.2f} deg")
+    if spread is not None:
+        dx, dy, dz = spread * 1e3
+        click.echo(f"standard deviation, as calibrated: x {dx:.2f} mm, y {dy:.2f} mm, z {dz:.2f} mm")
     shown = zip(JOINTS, in_degrees(q), tau, LOAD_UNITS, IS_LENGTH, strict=True)
     rows = [(name, f"{at:.4f} {'m' if length else 'deg'}", f"{load:.2f} {unit}") for name, at, load, unit, length in shown]
     print_rows(("joint", "position", f"to hold {boom.payload.mass:g} kg"), rows)

@@ -94,6 +94,7 @@ def _print_answer(report: "Report", first: "Answer", asked: str, whole: bool) ->
         few = len(report.notes) <= _FEW_NOTES
         print_lines("note", report.notes if few else [f"{len(report.notes)} notes: --all lists them"])
         figures = f"{first.assumed} assumed figure{'' if first.assumed == 1 else 's'}"
+        print_lines("measured", report.measured)
         console.print(f"{figures}, {len(report.rows)} checks: --all lists them", highlight=False)
 
 
@@ -121,6 +122,7 @@ def _print_details(report: "Report") -> None:
         print_rows(CERTIFICATE_HEADER, map(worst_cells, report.certificate.worst))
     print_lines(None, report.sentences)
     print_lines("note", report.notes)
+    print_lines("measured", report.measured)
     print_lines("assumed", report.assumptions)
 
 

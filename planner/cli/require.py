@@ -4,6 +4,7 @@ from typing import Any
 
 import click
 
+from boom_model.measured import measured_lines
 from boom_model.plausible import EFFICIENCY, FREQUENCY, TIP_TOLERANCE
 from planner.cli.completion import OneOf, OutFile, joints, missions
 from planner.cli.options import (
@@ -120,10 +121,11 @@ def require(
     text = requirement_markdown(f"Required of the drives: {title}", needs, day, notes, assumed)
     written = _write(files, needs, text, picture, document)
     if as_json:
-        _print_json(asked.name, needs, day, notes, assumed, written)
+        _print_json(asked.name, needs, day, notes, assumed, measured_lines(boom), written)
     else:
         print_lines(None, [f"{title}: required at the joint of each drive"])
         _print_sheet(needs, day, notes, assumed, whole)
+        print_lines("measured", measured_lines(boom))
         print_files(written)
         print_lines("next", [] if whole or document else [f"boom require {mission} --report sheet.pdf"])
     return 0
@@ -167,8 +169,9 @@ def _print_sheet(needs: Any, day: Any, notes: Any, assumed: Any, whole: bool) ->
     print_lines("assumed", assumed)
 
 
-def _print_json(name: str, needs: Any, day: Any, notes: Any, assumed: Any, written: dict[str, str]) -> None:
+def _print_json(name: str, needs: Any, day: Any, notes: Any, assumed: Any, measured: Any, written: dict[str, str]) -> None:
     from planner.sizing.requirement_tables import requirement_json
 
-    sheets, said = [requirement_json(need) for need in needs], {"notes": list(notes), "assumptions": list(assumed)}
+    sheets = [requirement_json(need) for need in needs]
+    said = {"notes": list(notes), "assumptions": list(assumed), "measured": list(measured)}
     print_json({"mission": name, "joints": sheets, "energy": day.to_json(), **said, "files": written})

@@ -103,7 +103,7 @@ class Plant:
             boom=boom,
             figures=figures,
             elastic=tuple(joints),
-            rotor=read_only([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]),
+            rotor=boom.drive_inertia,
             stiffness=read_only(np.reshape([g.torsion_stiffness for g in gears], (count, 3))),
             breaks=read_only(np.reshape([g.torsion_torques for g in gears], (count, 2))),
             gap=read_only([(g.backlash or 0.0) if backlash else 0.0 for g in gears]),

@@ -29,21 +29,18 @@ from scipy.stats import chi2, f
 
 from boom_model import Basis, Boom, InfeasibleError, InputError, Origin
 from boom_model.arrays import Array, Mask, checked, read_only
-from boom_model.calibration import Calibration
+from boom_model.calibration import INNER, SCALE, UPPER, WIND_UPS, Calibration
+from boom_model.tip_uncertainty import printed_wind_up
 from planner.experiments.calibration_model import (
     BASE,
-    INNER,
-    SCALE,
     SIDEWAYS,
     TOLERANCE,
-    UPPER,
-    WIND_UPS,
     TipModel,
     aligned,
     candidates,
-    printed_wind_up,
     require_a_shape,
 )
+from planner.experiments.measurement_checks import require_plausible_tips, still_notes
 from planner.experiments.measurements import Measurements
 
 Linkage = Literal["auto", "equal", "unequal"]
@@ -55,6 +52,7 @@ _HELD_FIRST = ("extension offset", "yaw offset", "L1", "L3", *WIND_UPS, SCALE, S
 """Parameters that are held before others that the data cannot tell them from."""
 
 _SHARE = 0.3  # of the largest component of a direction, from which a parameter takes part in it
+_PLACED = 3  # poses with three coordinates that tell the place of the boom
 _STARTS = 3  # fits with the noise or the wind-up of the one before
 _REJECTED = 0.001  # chance that a set of good poses loses one
 _LARGEST_REJECTED = 0.25
@@ -143,10 +141,11 @@ class Calibrated:
         at, C = self.predicted(other.readings)
         start = TipModel.of(self.start, self.model.target)
         yields = printed_wind_up(start.boom, start.joints(other.readings, np.zeros_like(other.readings)))
-        before = start.tip(other.readings, yields)
         if set(BASE) & set(self.free):
-            frame = aligned(before, other.tip)
-            before = before @ frame.R.T + frame.t
+            start = _placed(other, start, yields)
+        before = other.seen(start.tip(other.readings, yields))
+        R = other.across(at, np.broadcast_to(np.eye(3), C.shape))
+        C, at = R @ C @ np.swapaxes(R, -1, -2), other.seen(at)
         spread = np.sqrt(np.trace(C, axis1=1, axis2=2).mean())
         if other.tip_sd is not None:
             noise = np.square(np.where(np.isfinite(other.tip), other.tip_sd, 0.0)).sum(axis=-1)
@@ -207,6 +206,7 @@ def calibrate(
     if linkage == "equal" and not boom.geometry.is_parallelogram:
         equal = replace(boom.geometry, upper_less_lower=0.0, inner_less_outer=0.0)
         start = replace(start, boom=replace(boom, geometry=equal))
+    require_plausible_tips(measured, start, known_frame)
     if linkage != "equal":
         require_a_shape(start, measured.readings)
     names = {kind: _candidates(boom, known_frame, kind == "equal", fixed) for kind in ("equal", "unequal")}
@@ -271,8 +271,8 @@ def _fitted(
     readings, model = measured.readings, start
     yields = printed_wind_up(model.boom, model.joints(readings, np.zeros_like(readings)))
     if not known_frame:
-        model = replace(model, frame=aligned(start.tip(readings, yields), measured.tip))
-    before = measured.tip - model.tip(readings, yields)
+        model = _placed(measured, model, yields)
+    before = measured.tip - measured.seen(model.tip(readings, yields))
     sd, good, found = 1.0, used, None
     everything = np.ones(len(readings), dtype=bool)
     for _ in range(_STARTS):
@@ -291,6 +291,15 @@ def _fitted(
     return found
 
 
+def _placed(measured: Measurements, model: TipModel, yields: Array) -> TipModel:
+    """Return the model in its best place: by the tips themselves, or by distances from where it stands."""
+    tips = model.tip(measured.readings, yields)
+    if not measured.by_distance.any() or np.isfinite(measured.tip).all(axis=-1).sum() >= _PLACED:
+        return replace(model, frame=aligned(tips, measured.tip))
+    everything = np.ones(len(tips), dtype=bool)
+    return _solve(_Whitened(measured, model, yields, 1.0), model, BASE, everything, "cauchy")
+
+
 class _Whitened:
     """Residuals in standard deviations: those of the tip, and of the readings through the derivative."""
 
@@ -302,7 +311,7 @@ class _Whitened:
         C = np.zeros((n, 3, 3))
         C[:, range(3), range(3)] = spread**2
         if measured.reading_sd.any():
-            J = model.by_readings(measured.readings, yields)
+            J = measured.across(model.tip(measured.readings, yields), model.by_readings(measured.readings, yields))
             C += (J * measured.reading_sd[:, None, :] ** 2) @ np.swapaxes(J, -1, -2)
         gone = ~self.finite
         C[gone[:, :, None] | gone[:, None, :]] = 0.0
@@ -311,12 +320,14 @@ class _Whitened:
 
     def residuals(self, model: TipModel) -> Array:
         """Return the residuals (n, 3), 0 where not measured."""
-        off = np.where(self.finite, self.measured.tip - model.tip(self.measured.readings, self.yields), 0.0)
+        seen = self.measured.seen(model.tip(self.measured.readings, self.yields))
+        off = np.where(self.finite, self.measured.tip - seen, 0.0)
         return np.asarray((self.inverse @ off[..., None])[..., 0])
 
     def derivative(self, model: TipModel, names: tuple[str, ...]) -> Array:
         """Of the prediction, (n, 3, k), each column in tolerances of its parameter."""
         J = model.derivative(names, self.measured.readings, self.yields) * np.array([TOLERANCE[name] for name in names])
+        J = self.measured.across(model.tip(self.measured.readings, self.yields), J)
         return np.asarray(self.inverse @ np.where(self.finite[..., None], J, 0.0))
 
 
@@ -439,7 +450,7 @@ def _chance(plain: _Fit, general: _Fit) -> float:
     more = general.freedom
     extra = max(len(general.names) - len(plain.names), 1)
     scale = (plain.sd / general.sd) ** 2  # both in the general fit's standard deviations
-    ratio = max(plain.square * scale - general.square, 0.0) / extra / (general.square / more)
+    ratio = max(plain.square * scale - general.square, 0.0) / extra / (max(general.square, np.finfo(float).tiny) / more)
     return float(f.sf(ratio, extra, more))
 
 
@@ -451,13 +462,20 @@ def _result(
     factor = fit.factor
     widened = factor if not stated or (doubt < _DOUBT and factor > 1.0) else 1.0
     covariance = fit.covariance * (widened / fit.sd) ** 2
-    notes = []
+    notes = list(still_notes(measured))
+    if measured.by_distance.any():
+        notes.append(
+            f"{int(measured.by_distance.sum())} poses are measured by their distance: the error of that counts for them"
+        )
     if stated and widened > 1.0:
         notes.append(f"the intervals are widened by {factor:.2g}: more noise than stated, or the model lacks something")
     if (~fit.used).any():
         poses = np.flatnonzero(~fit.used)
         far = [f"{pose + 1} ({1e3 * float(np.linalg.norm(np.nan_to_num(fit.residuals[pose]))):.1f} mm)" for pose in poses]
-        notes.append(f"left out as bad targets: pose {', '.join(far)}; measure them again")
+        why = "measure them again"
+        if linkage == "equal":
+            why += ", or the links are not equal: --linkage auto asks the data"
+        notes.append(f"left out as bad targets: pose {', '.join(far)}; {why}")
     if chance is not None and linkage == "auto" and chance > _DOUBT:
         notes.append("the data do not tell the linkage from a parallelogram; equal links are kept")
     parameters = _parameters(start, fit, covariance)

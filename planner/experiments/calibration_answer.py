@@ -5,8 +5,9 @@ from typing import Any
 import numpy as np
 
 from boom_model.boom import IS_LENGTH
+from boom_model.calibration import LENGTHS, OFFSETS, SCALE, WIND_UPS
 from planner.experiments.calibration import USUAL_SD, Calibrated, Check, Parameter, rms
-from planner.experiments.calibration_model import LENGTHS, OFFSETS, SCALE, SIDEWAYS, WIND_UPS
+from planner.experiments.calibration_model import SIDEWAYS
 
 HEADER = ("figure", "was", "is", "sd", "unit")
 DETAILS = (SCALE, *WIND_UPS, SIDEWAYS)

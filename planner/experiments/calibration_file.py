@@ -11,9 +11,9 @@ from tomlkit.items import Table
 from boom_model import JOINTS, Boom, InputError
 from boom_model.boom import IS_LENGTH
 from boom_model.boom_file import BOOM_FILE
+from boom_model.calibration import INNER, LENGTHS, UPPER
 from boom_model.toml_file import editable_toml
 from planner.experiments.calibration import Calibrated
-from planner.experiments.calibration_model import INNER, LENGTHS, UPPER
 from planner.files import replacing
 
 _DIGITS = 10

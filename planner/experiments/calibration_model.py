@@ -14,17 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from boom_model import JOINTS, Boom, Geometry, InputError, forward_kinematics, gravity_torque, jacobian, wind_up
+from boom_model import Boom, Geometry, InputError, forward_kinematics, wind_up
 from boom_model.arrays import Array, read_only
 from boom_model.boom import IS_LENGTH
-from boom_model.kinematics.linkage import length_derivatives, rates, require_closed
+from boom_model.calibration import INNER, LENGTHS, OFFSETS, SCALE, UPPER, WIND_UPS
+from boom_model.tip_uncertainty import tip_by_joints, tip_by_lengths
 
-UPPER, INNER = "L5 - L3", "L9 - L4"
-LENGTHS = ("L1", "L2", "L3", "L4", "L6", "L7", "L8", UPPER, INNER)
 _FIELDS = dict(zip(LENGTHS, ("L1", "L2", "L3", "L4", "L6", "L7", "L8", "upper_less_lower", "inner_less_outer"), strict=True))
-OFFSETS = tuple(f"{joint} offset" for joint in JOINTS)
-SCALE = "extension scale"
-WIND_UPS = tuple(f"{joint} wind-up" for joint in JOINTS)
 SIDEWAYS = "target sideways"
 BASE = ("base turn x", "base turn y", "base turn z", "base x", "base y", "base z")
 
@@ -150,35 +146,9 @@ class TipModel:
         return np.asarray(self.frame.R @ (self._in_boom(self.joints(readings, yields)).joints * self.scale))
 
     def _in_boom(self, q: Array) -> "_Derivatives":
-        boom = self.boom
-        pose, J = forward_kinematics(boom, q), jacobian(boom, q)
-        arm = pose.rotation @ self.target
-        joints = J[:, :3] + np.cross(J[:, 3:], arm[..., None], axis=1)
-        forward = np.stack([np.cos(q[:, 0]), np.sin(q[:, 0]), np.zeros(len(q))], axis=-1)
-        up, normal = np.array([0.0, 0.0, 1.0]), np.stack([np.sin(q[:, 0]), -np.cos(q[:, 0]), np.zeros(len(q))], axis=-1)
-        psi = require_closed(boom, q)
-        c2, s2, c, s = np.cos(q[:, 1]), np.sin(q[:, 1]), np.cos(psi), np.sin(psi)
-        cp, sp = np.cos(psi + q[:, 4]), np.sin(psi + q[:, 4])
-
-        def in_plane(x: Array, z: Array) -> Array:
-            return np.asarray(forward * x[:, None] + up * z[:, None])
-
-        # joints[..., 2] turns all that hangs on the upper link by psi' = d psi / d theta3
-        by_psi = joints[..., 2] / rates(boom, q, np.broadcast_to(np.eye(5)[2], q.shape)).upper[:, None]
-        slopes = length_derivatives(boom, q)  # by L3, L4, L5, L9
-        radial = in_plane(c2, s2)
-        lengths = {
-            "L1": np.broadcast_to(up, (len(q), 3)),
-            "L2": forward,
-            "L3": by_psi * (slopes[:, 0] + slopes[:, 2])[:, None],
-            "L4": by_psi * (slopes[:, 1] + slopes[:, 3])[:, None] + radial,
-            "L6": in_plane(s, -c),
-            "L7": in_plane(-c, -s),
-            "L8": in_plane(-sp, cp),
-            UPPER: by_psi * slopes[:, 2, None],
-            INNER: by_psi * slopes[:, 3, None] + radial,
-        }
-        return _Derivatives(joints, lengths, normal)
+        normal = np.stack([np.sin(q[:, 0]), -np.cos(q[:, 0]), np.zeros(len(q))], axis=-1)
+        boom, target = self.boom, self.target
+        return _Derivatives(tip_by_joints(boom, q, target), tip_by_lengths(boom, q, target), normal)
 
 
 class _Derivatives(NamedTuple):
@@ -188,16 +158,6 @@ class _Derivatives(NamedTuple):
     """(n, 3) each"""
     sideways: Array
     """(n, 3)"""
-
-
-def printed_wind_up(boom: Boom, q: Array) -> Array:
-    """Return the wind-up (n, 5) [rad] of each joint by the printed curve of its gearbox; 0 where there is none."""
-    tau, yields = gravity_torque(boom, q), np.zeros(q.shape)
-    for i, drive in enumerate(boom.drives):
-        angle = None if drive is None else wind_up(drive.gearbox, tau[:, i])
-        if angle is not None:
-            yields[:, i] = angle
-    return yields
 
 
 def candidates(boom: Boom, *, known_frame: bool, equal_links: bool) -> tuple[str, ...]:

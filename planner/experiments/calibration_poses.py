@@ -16,7 +16,8 @@ from boom_model import Boom, InfeasibleError, InputError, forward_kinematics, gr
 from boom_model.arrays import Array, read_only
 from boom_model.drives.limits import static_limits
 from boom_model.kinematics.linkage import directions
-from planner.experiments.calibration_model import BASE, TOLERANCE, TipModel, candidates, printed_wind_up
+from boom_model.tip_uncertainty import printed_wind_up
+from planner.experiments.calibration_model import BASE, TOLERANCE, TipModel, candidates
 from planner.paths.clearance import require_clear
 
 _TRIED = 4096  # joint positions from which the candidates are taken

@@ -14,14 +14,14 @@ The effect on the torques follows from the derivatives of the torques by q, qd a
 them is M(q). A wider window passes less noise, but distorts the motion more.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import JOINTS, Basis, Boom, InputError, breakdown, forward_kinematics, inverse_dynamics
+from boom_model import JOINTS, Basis, Boom, InputError, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array, Mask, checked, read_only, scalar
 from boom_model.boom import IS_LENGTH, LOAD_UNITS
 from boom_model.dynamics.newton_euler import PayloadAs
@@ -250,11 +250,6 @@ class Comparison:
     """
     inside: Mask
     """(n,) True where tau_measured has that accuracy; peaks and means are taken there."""
-    payload_as: PayloadAs = "mass"
-    after: Boom | None = None
-    """The same boom as identified; None if there is no second model."""
-    tau_after: Array | None = None
-    """(n, 5) torques of the measured motion, from that model"""
 
     @property
     def joint_error(self) -> Array:
@@ -266,12 +261,6 @@ class Comparison:
         """Distance between the two tips, (n,) [m]."""
         error: Array = np.linalg.norm(self.tip_measured - self.tip_planned, axis=-1)
         return error
-
-    def _parts(self, boom: Boom, joint: int) -> dict[str, float]:
-        """RMS of each part of the torques of the measured motion, by a model."""
-        motion = self.measured
-        parts = breakdown(boom, motion.q, motion.qd, motion.qdd, payload_as=self.payload_as, friction=True)
-        return {part.name: _rms(getattr(parts, part.name)[self.inside, joint]) for part in fields(parts)}
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -296,14 +285,9 @@ class Comparison:
                 "noise": float(self.torque_noise[i]),
                 "measured_less_planned": _extremes(t, (self.tau_measured - self.tau_planned)[:, i], self.inside),
                 "logged_less_measured": None,
-                "logged_less_after": None,
-                "parts": self._parts(self.boom, i),
-                "parts_after": None if self.after is None else self._parts(self.after, i),
             }
             if self.tau_logged is not None:
                 torque["logged_less_measured"] = _extremes(t, (self.tau_logged - self.tau_measured)[:, i], self.inside)
-                if self.tau_after is not None:
-                    torque["logged_less_after"] = _extremes(t, (self.tau_logged - self.tau_after)[:, i], self.inside)
             position = {"unit": "m" if IS_LENGTH[i] else "rad", "noise": float(self.noise[i])}
             error = _extremes(t, self.joint_error[:, i], everywhere)
             joints.append({"joint": joint, "position": position | {"error": error}, "torque": torque})
@@ -327,10 +311,6 @@ class Comparison:
         }
 
 
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def compare(
     boom: Boom,
     planned: Trajectory,
@@ -339,7 +319,6 @@ def compare(
     offset: float | None = 0.0,
     window: float = WINDOW,
     payload_as: PayloadAs = "mass",
-    after: Boom | None = None,
 ) -> Comparison:
     """Compare a plan with a log, at the times of the log that lie within the plan.
 
@@ -355,7 +334,6 @@ def compare(
             also removes a delay of the drives.
         window: see `smoothed`.
         payload_as: see `inverse_dynamics`.
-        after: the boom as identified, for the torques of the log before and after.
 
     Raises:
         InputError: as `smoothed`; the plan has a single sample; or log and plan have fewer than two
@@ -393,19 +371,12 @@ def compare(
         noise=ready.noise,
         torque_noise=_torque_noise(boom, plan, ready.covariance, payload_as),
         inside=ready.inside[common],
-        payload_as=payload_as,
-        after=after,
-        tau_after=None if after is None else torques(after, measured, payload_as),
     )
 
 
 POSITION_HEADER = ("joint", "largest error", "at", "RMS", "mean", "noise")
 TORQUE_HEADER = ("joint", "largest", "at", "RMS", "noise")
 LOGGED_HEADER = ("joint", "largest", "at", "RMS")
-AFTER_HEADER = ("joint", "before", "after")
-"""Columns of `after_cells`: RMS of the torques of the log less those of the two models."""
-PARTS_HEADER = ("joint", "before", "after")
-"""Columns of `part_cells`: RMS of the parts of the two models' torques."""
 ANSWER_HEADER = ("joint", "largest error", "at", "RMS", "torque differs", "log differs")
 """Columns of `answer_cells`: the torque of the measured motion less the plan's, and the log's less
 the model's."""
@@ -437,22 +408,6 @@ def torque_cells(joint: dict[str, Any]) -> tuple[str, ...]:
 def logged_cells(joint: dict[str, Any]) -> tuple[str, ...]:
     """Return a joint of `Comparison.to_json` as table cells under LOGGED_HEADER."""
     return _torque_cells(joint, "logged_less_measured")
-
-
-def after_cells(joint: dict[str, Any]) -> tuple[str, ...]:
-    """Return a joint of `Comparison.to_json` as table cells under AFTER_HEADER."""
-    rms = (_torque_cells(joint, name)[3] for name in ("logged_less_measured", "logged_less_after"))
-    return joint["joint"], *rms
-
-
-def part_cells(joint: dict[str, Any]) -> tuple[str, ...]:
-    """Return a joint of `Comparison.to_json` as table cells under PARTS_HEADER."""
-    torque = joint["torque"]
-    parts = (
-        ", ".join(f"{name} {size:.3g}" for name, size in torque[key].items() if size > _NOTHING)
-        for key in ("parts", "parts_after")
-    )
-    return joint["joint"], *parts
 
 
 def _torque_cells(joint: dict[str, Any], difference: str) -> tuple[str, ...]:

@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from boom_model import JOINTS, Boom, breakdown
+from boom_model import JOINTS, Basis, Boom, Origin, Sourced, breakdown
 from boom_model.arrays import Array, read_only
-from boom_model.boom import LOAD_UNITS
+from boom_model.boom import IS_LENGTH, LOAD_UNITS
 from boom_model.dynamics.regressor import body_of_pseudo_inertia, body_parameters, pseudo_inertia_of_parameters
+from boom_model.plausible import DRIVE_INERTIA
 from planner.experiments.consistency import consistent_fit
 from planner.experiments.log_checks import delay_notes, require_plausible_torques
 from planner.experiments.readings import Readings
@@ -33,6 +34,12 @@ HELD_OUT = 0.2
 
 BLOCK = 0.04
 """Length [s] of the blocks of samples whose rows are averaged before the fit."""
+
+TOLD_APART = ("extension", "wrist")
+"""Joints whose drive inertia has an effect of its own on the torques.
+
+Those of the others look like an inertia of the link that they turn.
+"""
 
 _ITERATIONS = 6
 _STATES = 1500
@@ -119,12 +126,20 @@ class Identification:
 
     @cached_property
     def boom(self) -> Boom:
-        """The identified boom.
-
-        Its file has no place for a drive inertia, so drives stay as they were.
-        """
+        """The identified boom."""
         bodies = {name: body_of_pseudo_inertia(P) for name, P in zip(IDENTIFIED_BODIES, self.pseudo_inertias, strict=True)}
-        return with_dynamics(self.unknowns.boom, bodies, *self.parameters[75:].reshape(3, 5))
+        boom = with_dynamics(self.unknowns.boom, bodies, *self.parameters[75:].reshape(3, 5))
+        return boom if self.drive_inertia is None else boom.with_drive_inertia(self._rotors(self.drive_inertia))
+
+    def _rotors(self, inertia: Array) -> list[Sourced[float]]:
+        """Drive inertias with what the torques tell of them: of some joints only their sum with the link's inertia."""
+        found = []
+        for i, joint in enumerate(JOINTS):
+            shared = joint not in TOLD_APART
+            said = "together with the link's inertia, which torques do not tell from it" if shared else ""
+            source = said or f"to {self.deviations[70 + i]:.2g} {'kg' if IS_LENGTH[i] else 'kg m^2'}"
+            found.append(Sourced(max(float(inertia[i]), DRIVE_INERTIA.low), Origin(Basis.MEASURED, source)))
+        return found
 
     @property
     def drive_inertia(self) -> Array | None:
@@ -170,13 +185,15 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
 
     Args:
         boom: the boom with the payload that it carried; its figures are the starting point.
-        logs: measured motions. The last HELD_OUT of each is kept for validation.
+        logs: measured motions, as the joints read; the boom's calibration is applied. The last
+            HELD_OUT of each is kept for validation.
         drive_inertia: whether the torques accelerate the drives' own inertia too, as those computed from motor currents do.
 
     Raises:
         InputError: the torques have the wrong sign, unit or side of the gearbox; the message says which.
         InfeasibleError: as `consistent_fit`.
     """
+    logs = [log.calibrated(boom) for log in logs]
     seen = [log.part(slice(0, round((1.0 - HELD_OUT) * len(log.t)))) for log in logs]
     kept = [log.part(slice(round((1.0 - HELD_OUT) * len(log.t)), None)) for log in logs]
     require_plausible_torques(boom, seen)

@@ -1,10 +1,13 @@
 """The file of an identified boom: measured bodies and friction, everything else as it was."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from boom_model import JOINTS, Body, Boom
+from boom_model import JOINTS, Body, Boom, Sourced
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from boom_model.boom_file import BOOM_FILE
@@ -13,11 +16,14 @@ from planner.experiments.identification import Identification
 from planner.experiments.unknowns import IDENTIFIED_BODIES
 from planner.files import replacing
 
+if TYPE_CHECKING:
+    from tomlkit.items import InlineTable
+
 _INERTIA = "inertia_kg_m2"
 
 
 def write_identified(path: str | Path, source: str | Path | None, found: Identification, logs: str) -> None:
-    """Write a boom's TOML file with the identified bodies and friction, basis measured; comments stay.
+    """Write a boom's TOML file with the identified bodies, friction and drive inertia, basis measured; comments stay.
 
     Args:
         path: the file to write.
@@ -40,7 +46,11 @@ def write_identified(path: str | Path, source: str | Path | None, found: Identif
         f"asymmetric to {deviations[85 + i]:.2g}"
         for i, joint in enumerate(JOINTS)
     }
-    _write(path, source, found.boom, bodies, friction, None)
+    rotors = {}
+    if found.drive_inertia is not None:
+        known = zip(JOINTS, found.boom.drives, found.boom.rotors, strict=True)
+        rotors = {joint: rotor if drive is None else drive.inertia for joint, drive, rotor in known}
+    _write(path, source, found.boom, bodies, friction, None, {joint: (r, logs) for joint, r in rotors.items() if r is not None})
 
 
 def write_payload(path: str | Path, source: str | Path | None, boom: Boom, why: str) -> None:
@@ -59,6 +69,7 @@ def _write(
     bodies: dict[str, str],
     friction: dict[str, str],
     payload: str | None,
+    rotors: Mapping[str, tuple[Sourced[float], str]] = MappingProxyType({}),
 ) -> None:
     import tomlkit
 
@@ -70,6 +81,9 @@ def _write(
     for i, joint in enumerate(JOINTS):
         if joint in friction:
             document["joints"][joint]["friction"] = _friction_table(boom, i, friction[joint])
+        if joint in rotors:
+            key = f"drive_inertia_{'kg' if IS_LENGTH[i] else 'kg_m2'}"
+            document["joints"][joint][key] = _rotor_table(*rotors[joint])
     with replacing(path) as temporary:
         Path(temporary).write_text(tomlkit.dumps(document), encoding="utf-8")
 
@@ -94,6 +108,15 @@ def _friction_table(boom: Boom, joint: int, why: str) -> dict[str, object]:
         "basis": "measured",
         "source": why,
     }
+
+
+def _rotor_table(inertia: Sourced[float], logs: str) -> "InlineTable":
+    import tomlkit
+
+    table = tomlkit.inline_table()
+    table.update({"value": _digits(inertia.value), "basis": str(inertia.origin.basis)})
+    table["source"] = f"boom identify {logs}: {inertia.origin.source}"
+    return table
 
 
 def _digits(value: float) -> float:

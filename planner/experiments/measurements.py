@@ -1,4 +1,4 @@
-"""Measured tip positions with the joint readings of their poses, as a CSV file."""
+"""Measured tip positions, or distances of the tip from fixed points, with the joint readings of their poses."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model import JOINTS, InputError
-from boom_model.arrays import Array, checked, read_only
+from boom_model.arrays import Array, Mask, checked, read_only
 from boom_model.boom import IS_LENGTH
 from planner.files import replacing
 from planner.motion.trajectory import opened
@@ -21,6 +21,8 @@ READINGS = tuple(f"q{i + 1}" for i in range(5))
 COORDINATES = ("x", "y", "z")
 _TIP_SD = ("sx", "sy", "sz")
 _READING_SD = tuple(f"sq{i + 1}" for i in range(5))
+_DISTANCE, _DISTANCE_SD, _ANCHOR = "d", "sd", ("ax", "ay", "az")
+_NEAREST = 1e-6  # [m]
 _FARTHEST = 100.0  # [m] of a target from the origin of its frame, beyond which a coordinate is taken for millimetres
 _WORST = 0.1  # [m] standard deviation beyond which it is taken for millimetres
 
@@ -32,12 +34,42 @@ class Measurements:
     readings: Array
     """(n, 5) [rad, the extension in m]"""
     tip: Array
-    """(n, 3) in the measuring frame [m]; NaN for a coordinate that was not measured."""
+    """(n, 3) in the measuring frame [m]; NaN for a coordinate that was not measured.
+
+    Where a pose has an anchor, the distance from it stands first, and the others are NaN.
+    """
     tip_sd: Array | None
     """(n, 3) standard deviation [m]; None if unknown."""
     reading_sd: Array
     """(n, 5) standard deviation of the readings [rad, m]"""
     name: str = "measurements"
+    anchor: Array | None = None
+    """(n, 3) fixed point from which the distance was measured [m], NaN for a pose with coordinates; None without any."""
+
+    @property
+    def by_distance(self) -> Mask:
+        """(n,) whether a pose has a distance instead of coordinates."""
+        return np.zeros(len(self.tip), dtype=bool) if self.anchor is None else np.isfinite(self.anchor[:, 0])
+
+    def seen(self, tip: Array) -> Array:
+        """Return what is measured of tips (n, 3) in the measuring frame: the coordinates, or the distance and zeros."""
+        if self.anchor is None:
+            return tip
+        by, found = self.by_distance, tip.copy()
+        found[by] = 0.0
+        found[by, 0] = np.linalg.norm(tip[by] - self.anchor[by], axis=-1)
+        return found
+
+    def across(self, tip: Array, J: Array) -> Array:
+        """Return the derivative (n, 3, k) of `seen` for that of the tips, J (n, 3, k)."""
+        if self.anchor is None:
+            return J
+        by, found = self.by_distance, J.copy()
+        arm = tip[by] - self.anchor[by]
+        along = arm / np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), _NEAREST)
+        found[by] = 0.0
+        found[by, 0] = np.einsum("ni,nik->nk", along, J[by])
+        return found
 
     @staticmethod
     def of(
@@ -46,8 +78,17 @@ class Measurements:
         tip_sd: ArrayLike | None = None,
         reading_sd: ArrayLike = 0.0,
         name: str = "measurements",
+        anchor: ArrayLike | None = None,
     ) -> "Measurements":
         """Return checked measurements; standard deviations broadcast.
+
+        Args:
+            readings: (n, 5)
+            tip: (n, 3); see the fields.
+            tip_sd: of the coordinates, and of a distance in the first of its row; None if unknown.
+            reading_sd: of the readings.
+            name: of the measurements in messages.
+            anchor: (n, 3); see the fields.
 
         Raises:
             InputError: a value is not finite (but NaN in tip), shapes do not match, a unit looks
@@ -76,7 +117,20 @@ class Measurements:
         joint = read_only(np.broadcast_to(checked(f"{name}: standard deviation of the readings", reading_sd), q.shape))
         if (joint < 0.0).any():
             raise InputError(f"{name}: a standard deviation of a reading is {joint.min():g}; it must not be negative")
-        return Measurements(read_only(q), read_only(where), spread, joint, name)
+        return Measurements(read_only(q), read_only(where), spread, joint, name, _anchors(name, where, anchor))
+
+
+def _anchors(name: str, tip: Array, anchor: ArrayLike | None) -> Array | None:
+    if anchor is None:
+        return None
+    points = np.asarray(anchor, dtype=float)
+    by = np.isfinite(points).all(axis=-1)
+    for i in np.flatnonzero(by):
+        if not 0.0 < tip[i, 0] <= _FARTHEST:
+            raise InputError(
+                f"{name}: the distance of pose {i + 1} is {tip[i, 0]:g}; it must be above 0 and at most {_FARTHEST:g} m"
+            )
+    return read_only(points) if by.any() else None
 
 
 def _require_si(name: str, q: Array, tip: Array) -> None:
@@ -95,52 +149,76 @@ def _require_si(name: str, q: Array, tip: Array) -> None:
 
 
 def read_measurements(path: str | Path, tip_sd: float | None = None) -> Measurements:
-    """Read q1..q5 and x, y, z, with any of sx, sy, sz and sq1..sq5, all in SI; an empty coordinate was not measured.
+    """Read q1..q5 and x, y, z, or d and ax, ay, az, with any of sx, sy, sz, sd and sq1..sq5, all in SI.
+
+    An empty coordinate was not measured. d is the distance of the tip from the fixed point ax, ay, az.
 
     Args:
         path: the CSV file.
-        tip_sd: standard deviation of a coordinate [m] where the file has none.
+        tip_sd: standard deviation of a coordinate or distance [m] where the file has none.
 
     Raises:
         InputError: the file cannot be read, a column is missing or does not hold numbers, or as `Measurements.of`.
     """
     table = _table(path)
-    missing = [name for name in (*READINGS, *COORDINATES) if name not in table.column_names]
+    names = frozenset(table.column_names)
+    far = bool(names & {_DISTANCE, *_ANCHOR})
+    needed = (*READINGS, *((_DISTANCE, *_ANCHOR) if far else COORDINATES))
+    missing = [name for name in needed if name not in names]
     if missing:
         raise InputError(
             f"{path}: column {missing[0]} is missing; a row needs {', '.join((*READINGS, *COORDINATES))}: the readings of the "
-            "joints and the measured tip"
+            "joints and the measured tip; or d, ax, ay, az: its distance from a fixed point"
         )
     if not table.num_rows:
         raise InputError(f"{path}: has no pose; measure the tip in at least 10 poses (boom calibrate --suggest 30)")
 
-    def columns(names: tuple[str, ...], missing: float | None = None) -> Array:
-        found = []
-        for name in names:
-            values = np.asarray(table[name].to_numpy(), dtype=float)
-            if missing is None and np.isnan(values).any():
-                raise InputError(f"{path}: {name} is empty in pose {int(np.argmax(np.isnan(values))) + 1}")
-            found.append(values if missing is None else np.where(np.isnan(values), missing, values))
-        return np.stack(found, axis=-1)
+    def column(name: str, empty: float | None = None) -> Array:
+        if name not in names:
+            return np.full(table.num_rows, np.nan if empty is None else empty)
+        values = np.asarray(table[name].to_numpy(), dtype=float)
+        if empty is None and np.isnan(values).any():
+            raise InputError(f"{path}: {name} is empty in pose {int(np.argmax(np.isnan(values))) + 1}")
+        return values if empty is None else np.where(np.isnan(values), empty, values)
+
+    def columns(wanted: tuple[str, ...], empty: float | None = None) -> Array:
+        return np.stack([column(name, empty) for name in wanted], axis=-1)
 
     spread: Array | float | None = tip_sd
-    if any(name in table.column_names for name in _TIP_SD):
-        lacking = [name for name in _TIP_SD if name not in table.column_names]
+    usual = 1e-3 if tip_sd is None else tip_sd
+    if any(name in names for name in _TIP_SD):
+        lacking = [name for name in _TIP_SD if name not in names]
         if lacking:
             raise InputError(f"{path}: column {lacking[0]} is missing; give all of sx, sy and sz, or none")
-        spread = columns(_TIP_SD, missing=1e-3 if tip_sd is None else tip_sd)
-    joint = np.zeros((table.num_rows, 5))
-    for i, name in enumerate(_READING_SD):
-        if name in table.column_names:
-            joint[:, i] = columns((name,))[:, 0]
-    return Measurements.of(columns(READINGS), columns(COORDINATES, missing=np.nan), spread, joint, str(path))
+        spread = columns(_TIP_SD, usual)
+    tip, anchor = columns(COORDINATES, np.nan), None
+    if far:
+        anchor, distance = columns(_ANCHOR, np.nan), column(_DISTANCE, np.nan)
+        tip, anchor = _with_distances(str(path), tip, distance, anchor)
+        if _DISTANCE_SD in names:
+            spread = np.array(np.broadcast_to(usual if spread is None else spread, tip.shape))
+            spread[:, 0] = np.where(np.isfinite(anchor[:, 0]), column(_DISTANCE_SD, usual), spread[:, 0])
+    joint = columns(_READING_SD, 0.0)
+    return Measurements.of(columns(READINGS), tip, spread, joint, str(path), anchor)
+
+
+def _with_distances(name: str, tip: Array, distance: Array, anchor: Array) -> tuple[Array, Array]:
+    """Return the tips with distances in the first place, and their anchors, NaN elsewhere."""
+    by = np.isfinite(distance)
+    for i in np.flatnonzero(by):
+        if not np.isfinite(anchor[i]).all():
+            raise InputError(f"{name}: pose {i + 1} has a distance d, but not all of ax, ay, az: the point it is measured from")
+        if np.isfinite(tip[i]).any():
+            raise InputError(f"{name}: pose {i + 1} has a distance and coordinates; give each a row of its own")
+    tip[by, 0] = distance[by]
+    return tip, np.where(by[:, None], anchor, np.nan)
 
 
 def _table(path: str | Path) -> "pa.Table":
     import pyarrow as pa
     from pyarrow import csv
 
-    known = (*READINGS, *COORDINATES, *_TIP_SD, *_READING_SD)
+    known = (*READINGS, *COORDINATES, *_TIP_SD, *_READING_SD, _DISTANCE, _DISTANCE_SD, *_ANCHOR)
     try:
         options = csv.ConvertOptions(column_types=dict.fromkeys(known, pa.float64()))
         table = csv.read_csv(opened(path), convert_options=options)

@@ -76,12 +76,13 @@ def identify_payload(boom: Boom, logs: Sequence[Readings], *, drive_inertia: boo
 
     Args:
         boom: the boom, best as `identify` measured it; its payload is the starting point.
-        logs: moves with the unknown payload.
+        logs: moves with the unknown payload, as the joints read; the boom's calibration is applied.
         drive_inertia: as in `identify`.
 
     Raises:
         InputError: the torques have the wrong sign, unit or side of the gearbox.
     """
+    logs = [log.calibrated(boom) for log in logs]
     require_plausible_torques(boom, logs, payload_known=False)
     unknowns = Unknowns(boom, drive_inertia, np.ones(5))
     parts = [_rows(unknowns, log) for log in logs]

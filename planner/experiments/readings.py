@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import JOINTS, InputError
+from boom_model import JOINTS, Boom, InputError
 from boom_model.arrays import Array, Mask, checked, read_only
 from boom_model.boom import IS_LENGTH
 from planner.experiments.comparison import Log, evenly_sampled, read_log
@@ -76,6 +76,21 @@ class Readings:
         gain = (2.0 * np.pi * f) ** 4 * np.sinc(f * block) ** 2 / (1.0 + (f / self.cutoff) ** (2 * _ORDER)) ** 2
         return np.asarray(2.0 * self.step * self.position_noise**2 * np.trapezoid(gain, f))
 
+    def calibrated(self, boom: Boom) -> "Readings":
+        """Return the joint positions in the place of readings, where the boom is calibrated."""
+        known = boom.calibration
+        if known is None:
+            return self
+        note = f"offsets and scale of the readings are applied: {known.origin.source}"
+        return replace(
+            self,
+            q=known.joint_positions(self.q),
+            qd=known.scale * self.qd,
+            qdd=known.scale * self.qdd,
+            position_noise=known.scale * self.position_noise,
+            notes=(*self.notes, note),
+        )
+
     def part(self, samples: slice) -> "Readings":
         """Return some of the samples."""
         names = ("t", "q", "qd", "qdd", "tau", "moving")
@@ -101,12 +116,13 @@ def read_torque_log(path: str | Path, torque_per_ampere: ArrayLike | None = None
     return replace(log, tau=read_only(log.tau * checked("torque per ampere", torque_per_ampere, 5)))
 
 
-def readings_of(log: Log, cutoff: float | None = None) -> Readings:
+def readings_of(log: Log, cutoff: float | None = None, *, every_joint: bool = True) -> Readings:
     """Return a log's states and torques, with filtered positions and their derivatives.
 
     Args:
         log: positions and torques. Velocities and accelerations are used as given if both are there.
         cutoff: of the filter [Hz]. None selects the narrowest that removes noise alone.
+        every_joint: whether every joint must move, as a fit needs it.
 
     Raises:
         InputError: there are no torques or fewer than 40 samples, a gap is too long, a joint does not move, or the cut-off is
@@ -126,7 +142,8 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
     even = evenly_sampled(log, LONGEST_GAP)
     tau, h = even.tau, float(even.t[-1] - even.t[0]) / (len(even.t) - 1)
     assert tau is not None
-    _require_motion(even.q)
+    if every_joint:
+        _require_motion(even.q)
     noise = np.maximum(_noise(even.q), _ROUNDING)
     if cutoff is not None and not 0.0 < cutoff < 0.5 / h:
         raise InputError(f"cutoff is {cutoff:g} Hz; it must be between 0 and {0.5 / h:g} Hz, half the log's sampling rate")

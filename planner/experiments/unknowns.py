@@ -18,7 +18,6 @@ import numpy as np
 
 from boom_model import JOINTS, Boom
 from boom_model.arrays import Array, Mask
-from boom_model.drives.drive import reflected_inertia
 from boom_model.dynamics.regressor import (
     PARAMETER_NAMES,
     REGRESSOR_BODIES,
@@ -65,12 +64,11 @@ class Unknowns:
     @cached_property
     def start(self) -> Array:
         """p0 (90,): the figures of the boom's file."""
-        rotors = [(drive and reflected_inertia(drive)) or 0.0 for drive in self.boom.drives]
         friction = self.boom.friction
         return np.concatenate(
             [
                 *(body_parameters(self.boom.bodies[name]) for name in IDENTIFIED_BODIES),
-                rotors if self.drive_inertia else np.zeros(5),
+                self.boom.drive_inertia if self.drive_inertia else np.zeros(5),
                 friction.viscous,
                 friction.coulomb,
                 friction.asymmetric,

@@ -34,8 +34,8 @@ from numpy.typing import ArrayLike
 
 from boom_model import JOINTS, Body, Boom, InputError, inverse_dynamics
 from boom_model.arrays import Array
-from boom_model.boom import IS_LENGTH
-from boom_model.drives.drive import drive_torque_limit, reflected_inertia
+from boom_model.boom import IS_LENGTH, LOAD_UNITS
+from boom_model.drives.drive import drive_torque_limit
 from boom_model.kinematics.frames import R_LINK_BODY
 from planner.files import replacing
 from planner.reports.report import assumptions
@@ -162,9 +162,27 @@ def mjcf(boom: Boom) -> str:
     return _document(top)
 
 
+def left_out(boom: Boom) -> tuple[str, ...]:
+    """Return what was measured on the boom and neither format can represent."""
+    sizes = [
+        f"{joint} {size:.4g} {unit}"
+        for joint, size, unit in zip(JOINTS, boom.friction.asymmetric, LOAD_UNITS, strict=True)
+        if size != 0.0
+    ]
+    found = []
+    if sizes:
+        found.append(
+            "dry friction is the same in both directions; the asymmetric part is left out, to be added to the torque of a "
+            f"joint that moves: {', '.join(sizes)}"
+        )
+    if boom.calibration is not None:
+        found.append("joint coordinates are true positions; offsets and scale of the readings are left out")
+    return tuple(found)
+
+
 def _remarks(boom: Boom) -> list[str]:
     assumed = [f"Assumed: {sentence}".replace("--", "- -") for sentence in assumptions(boom, jerk_limited=False)]
-    return [_DRAWN, *assumed]
+    return [_DRAWN, *left_out(boom), *assumed]
 
 
 # The tree
@@ -395,9 +413,8 @@ def _mjcf_body(element: Element, boom: Boom, link: _Link) -> None:
         i = JOINTS.index(link.joint) if link.joint in JOINTS else None
         own: dict[str, str] = {}
         if i is not None:
-            drive = boom.drives[i]
             numbers = {
-                "armature": (drive and reflected_inertia(drive)) or 0.0,
+                "armature": boom.drive_inertia[i],
                 "damping": boom.friction.viscous[i],
                 "frictionloss": boom.friction.coulomb[i],
             }

@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from planner.recording.before_after import write_before_after_recording as write_before_after_recording
     from planner.recording.comparison import write_comparison_recording as write_comparison_recording
     from planner.recording.control import write_control_recording as write_control_recording
     from planner.recording.link import write_link_recording as write_link_recording
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from planner.recording.reach import write_reach_recording as write_reach_recording
 
 _HOME = {
+    "write_before_after_recording": "planner.recording.before_after",
     "write_comparison_recording": "planner.recording.comparison",
     "write_control_recording": "planner.recording.control",
     "write_link_recording": "planner.recording.link",

@@ -9,8 +9,10 @@ import rerun.blueprint as rrb
 from boom_model import JOINTS, forward_kinematics
 from boom_model.boom import IS_LENGTH
 from planner.experiments.comparison import Comparison
+from planner.experiments.residuals import Residuals
+from planner.recording.before_after import before_after_bundles
 from planner.recording.layout import eye_of, grid, scene, shown_beside, text
-from planner.recording.palette import AFTER_COLOR, JOINT_COLORS, LIMIT_COLOR, PAYLOAD_COLOR
+from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, PAYLOAD_COLOR
 from planner.recording.plots import Bundle, for_people
 from planner.recording.scene import (
     PLANNED,
@@ -27,7 +29,7 @@ from planner.recording.stream import log_markdown, save
 _LEGEND = "Solid bodies and the light path show the measured motion. Edges and the orange path show the plan."
 
 
-def write_comparison_recording(path: str | Path, comparison: Comparison) -> None:
+def write_comparison_recording(path: str | Path, comparison: Comparison, models: Residuals | None = None) -> None:
     """Write the recording of a measured motion and its plan, with its blueprint.
 
     The entities are those of a move (see `write_recording`), with these differences:
@@ -39,24 +41,24 @@ def write_comparison_recording(path: str | Path, comparison: Comparison) -> None
     /plots/<quantity>/<joint>   planned and measured q and tau; measured torques too, where the log
                                 has them
     /plots/error/<joint>        measured minus planned position [deg, m]
-    /plots/left/<joint>         torques of the log less those of the model, before and after identification, where there is a
-                                second model
     /plots/error/tip            distance between the two tips [mm]
 
     Args:
         path: the .rrd file.
         comparison: the plan and the log at common times.
+        models: the log beside two models, whose curves are added on the clock of the plan.
 
     Raises:
         InputError: the file cannot be written. An existing file is left unchanged.
     """
     boom, planned, measured = comparison.boom, comparison.planned, comparison.measured
-    bundles = _bundles(comparison)
+    bundles, more = _bundles(comparison), {} if models is None else before_after_bundles(models)
+    named = {f"{name}: before, after": tab for name, tab in more.items() if name != "Torques"}
     tips = [forward_kinematics(boom, motion.q).position for motion in (measured, planned)]
     reached = np.concatenate(tips)
 
     def log(recording: rr.RecordingStream) -> None:
-        tabs = [grid(name, tab) for name, tab in bundles.items()]
+        tabs = [grid(name, tab) for name, tab in (bundles | named).items()]
         right = rrb.Tabs(*tabs, text("report", "Report"), active_tab=0)
         view = scene("Boom [m]", eye_of(boom, planned.q), ground_level(boom, reached))
         recording.send_blueprint(shown_beside(view, right, [1, 1]))
@@ -72,6 +74,9 @@ def write_comparison_recording(path: str | Path, comparison: Comparison) -> None
         log_path(recording, "world/planned/tip_path", tips[1], LIMIT_COLOR)
         for bundle in (bundle for tab in bundles.values() for bundle in tab):
             bundle.log(recording, planned.t)
+        for bundle in (bundle for tab in named.values() for bundle in tab):
+            assert models is not None
+            bundle.log(recording, models.t + comparison.offset)
 
     save(path, f"{boom.name}: measured and planned", log)
 
@@ -95,13 +100,6 @@ def _bundles(c: Comparison) -> dict[str, list[Bundle]]:
         if c.tau_logged is not None:
             names, colors = [*names, "measured"], [*both, PAYLOAD_COLOR]
             torques.append(c.tau_logged)
-        if c.tau_after is not None:
-            names, colors = [*names, "identified model"], [*colors, AFTER_COLOR]
-            torques.append(c.tau_after)
-        if c.tau_logged is not None and c.tau_after is not None:
-            left = np.stack([(c.tau_logged - tau)[:, i] for tau in (c.tau_measured, c.tau_after)], axis=-1)
-            words, shades = ["before", "after"], [LIMIT_COLOR, AFTER_COLOR]
-            tabs["Errors"].append(Bundle(f"plots/left/{joint}", f"{joint}: log less model [{force}]", words, shades, left))
         values = np.stack([tau[:, i] for tau in torques], axis=-1)
         name = "force" if IS_LENGTH[i] else "torque"
         tabs["Torques"].append(Bundle(f"plots/tau/{joint}", f"{joint} {name} [{force}]", names, colors, values))

@@ -15,6 +15,7 @@ def answer_markdown(boom: Boom, report: Report) -> str:
     """Return the lines that the command prints first: verdict, table of joints, findings, possible fixes."""
     first = answer(report)
     listed = [*first.findings, *(f"possible fix: {each}" for each in report.suggestions)]
+    listed += [f"measured: {each}" for each in report.measured]
     counted = f"{first.assumed} assumed figures, {len(report.rows)} checks: see the tab Assumptions."
     return "\n".join(
         [

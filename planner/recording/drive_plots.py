@@ -7,6 +7,7 @@ import numpy as np
 from boom_model import JOINTS, Basis, Drive, tip_deflection
 from boom_model.arrays import Array
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
+from boom_model.drives.gear_compliance import SURE
 from planner.checks.kinds import CheckKind
 from planner.planning import Move
 from planner.recording.palette import (
@@ -18,6 +19,7 @@ from planner.recording.palette import (
     PURPLE,
     SKY_BLUE,
     TOTAL_COLOR,
+    YELLOW,
 )
 from planner.recording.plots import Bundle
 
@@ -103,11 +105,20 @@ def margin(demand: Array, limit: Array) -> Array:
 def tip_bundle(move: Move) -> Bundle:
     """Return the error budget of the tip [mm]."""
     budget = tip_deflection(move.boom, move.trajectory.q, move.loads.tau)
-    parts = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
-    names = [f"{name} [mm]" for name in ("wind-up", "hysteresis", "backlash", "step error", "total")]
-    values = np.stack(parts, axis=-1) * 1e3
-    colors = [SKY_BLUE, ORANGE, GREEN, PURPLE, TOTAL_COLOR]
-    return Bundle("plots/tip/deflection", "largest tip deflection caused by the drives [mm]", names, colors, values)
+    parts = {
+        "wind-up": (np.linalg.norm(budget.wind_up, axis=-1), SKY_BLUE),
+        "hysteresis": (budget.hysteresis, ORANGE),
+        "backlash": (budget.backlash, GREEN),
+        "step error": (budget.step, PURPLE),
+    }
+    title = "largest tip deflection caused by the drives [mm]"
+    if move.boom.calibration is not None:
+        parts[f"geometry, {SURE:g} sd"] = SURE * budget.geometry, YELLOW
+        title = "largest tip error by drives and measured geometry [mm]"
+    parts["total"] = budget.total, TOTAL_COLOR
+    curves, colors = zip(*parts.values(), strict=True)
+    names = [f"{name} [mm]" for name in parts]
+    return Bundle("plots/tip/deflection", title, names, colors, np.stack(curves, axis=-1) * 1e3)
 
 
 def _basis(drive: Drive) -> Basis:

@@ -53,6 +53,8 @@ class Place:
 
 BOOM = Place()
 PLANNED = Place("world/planned", "planned ")
+BEFORE = Place("world/before", "before ")
+"""A model of the machine before it was measured."""
 
 
 def log_mount(recording: rr.RecordingStream, t: Array, vehicle: VehicleCase | None) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from boom_model import JOINTS, Boom, Drive, InputError, tip_deflection
 from boom_model.arrays import Array
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
+from boom_model.drives.gear_compliance import SURE
 from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Row, Verdict
 from planner.files import replacing
@@ -27,7 +28,7 @@ COLORS = {  # Okabe and Ito's palette, readable with colour blindness
     Verdict.FAIL: "#d55e00",
     Verdict.INFO: "#999999",
 }
-_FORWARD, _REVERSED, _CURVE = "#0072b2", "#56b4e9", "#000000"
+_FORWARD, _REVERSED, _CURVE, _GEOMETRY = "#0072b2", "#56b4e9", "#000000", "#f0e442"
 _LONGEST_BAR = 3.0
 _WIDTHS = (1.0, 1.0, 0.22, 0.9)
 """Relative widths of the three panels. The third column holds the names of the bars."""
@@ -200,14 +201,19 @@ def _gearbox(axes: "Axes", drive: Drive, joint: str, t: Array, tau: Array, parts
 def _tip(axes: "Axes", boom: Boom, trajectory: Trajectory, tau: Array, parts: Sequence[slice]) -> None:
     """Draw the error budget of the tip over time: its parts and their sum."""
     budget = tip_deflection(boom, trajectory.q, tau)
-    values = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step, budget.total]
-    names = ["wind-up", "hysteresis", "backlash", "step error", "total"]
-    colors = [_FORWARD, COLORS[Verdict.WARN], COLORS[Verdict.PASS], "#cc79a7", _CURVE]
+    values = [np.linalg.norm(budget.wind_up, axis=-1), budget.hysteresis, budget.backlash, budget.step]
+    names = ["wind-up", "hysteresis", "backlash", "step error"]
+    colors = [_FORWARD, COLORS[Verdict.WARN], COLORS[Verdict.PASS], "#cc79a7"]
+    by = "caused by the drives"
+    if boom.calibration is not None:
+        values, by = [*values, SURE * budget.geometry], "by drives and measured geometry"
+        names, colors = [*names, f"geometry, {SURE:g} sd"], [*colors, _GEOMETRY]
+    values, names, colors = [*values, budget.total], [*names, "total"], [*colors, _CURVE]
     _over_time(axes, trajectory.t, np.stack(values, axis=-1) * 1e3, parts, names, colors)
     missing = " (parts without data are left out)" if budget.uncounted else ""
-    axes.set(title=f"tip deflection caused by the drives{missing}", ylabel="largest deflection [mm]")
+    axes.set(title=f"tip deflection {by}{missing}", ylabel="largest deflection [mm]")
     axes.set_ylim(bottom=0.0)
-    _legend_below(axes, 5, gap=0.17)
+    _legend_below(axes, len(names), gap=0.17)
 
 
 def _over_time(

@@ -31,6 +31,7 @@ def first_page(title: str, asked: str, report: Report) -> str:
     first = answer(report)
     said = first.sentence.partition(": ")[2]
     findings = [*first.findings, *(f"possible fix: {each}" for each in report.suggestions)]
+    findings += [f"measured: {each}" for each in report.measured]
     lines = [f"# {title}", "", asked, "", f"**{first.verdict}**: {said}", "", *table(JOINT_HEADER, first.joints), ""]
     lines += [*(f"- {each}" for each in findings), ""]
     lines.append(f"{first.assumed} assumed figures and all {len(report.rows)} checks are at the end.")

@@ -76,6 +76,8 @@ class Report:
     """Power and energy; None if not computed."""
     suggestions: tuple[str, ...] = ()
     """Single changes that make a failing motion possible; empty if none were searched."""
+    measured: tuple[str, ...] = ()
+    """What of the boom was measured on the machine, with the log."""
 
     @property
     def verdict(self) -> Verdict:
@@ -126,6 +128,7 @@ class Report:
             "checks": [row.to_json() for row in self.rows],
             "notes": list(self.notes),
             "assumptions": list(self.assumptions),
+            "measured": list(self.measured),
             "torque_peaks": [asdict(peak) for peak in self.peaks],
             "certificate": None if self.certificate is None else asdict(self.certificate),
             "stop": None if self.stop is None else asdict(self.stop),
@@ -164,7 +167,7 @@ class Report:
         lines += [f"\n{sentence}" for sentence in self.sentences]
         lines += [*section("Possible fixes", self.suggestions), *section("Notes", self.notes)]
         lines += ["", "## Every check", "", *table(header, [(*cells(row), row.source) for row in self.rows])]
-        return "\n".join([*lines, *section("Assumed", self.assumptions)]) + "\n"
+        return "\n".join([*lines, *section("Measured", self.measured), *section("Assumed", self.assumptions)]) + "\n"
 
 
 def cells(row: Row) -> tuple[str, ...]:

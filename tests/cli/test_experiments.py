@@ -7,7 +7,7 @@ import pytest
 
 from boom_model import Boom, forward_kinematics
 from boom_model.boom_file import BOOM_FILE
-from planner.experiments.calibration_model import printed_wind_up
+from boom_model.tip_uncertainty import printed_wind_up
 from planner.experiments.measurements import READINGS
 
 HEADER = ",".join((*READINGS, "x", "y", "z"))

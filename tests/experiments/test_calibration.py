@@ -9,20 +9,15 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from boom_model import Basis, Boom, InfeasibleError, InputError, forward_kinematics, transmission_angle
+from boom_model.calibration import INNER, LENGTHS, OFFSETS, SCALE, UPPER, WIND_UPS
+from boom_model.tip_uncertainty import printed_wind_up
 from planner.experiments.calibration import calibrate, rms
 from planner.experiments.calibration_file import write_calibrated
 from planner.experiments.calibration_model import (
     BASE,
-    INNER,
-    LENGTHS,
-    OFFSETS,
-    SCALE,
-    UPPER,
-    WIND_UPS,
     Frame,
     TipModel,
     candidates,
-    printed_wind_up,
 )
 from planner.experiments.calibration_poses import suggest_poses
 from planner.experiments.comparison import Log, compare
@@ -298,3 +293,101 @@ def test_too_little_data_is_refused_with_what_to_measure(tmp_path):
     write_poses(tmp_path / "poses.csv", q)
     with pytest.raises(InputError, match="pose 1 has no coordinate"):
         read_measurements(tmp_path / "poses.csv")
+
+
+ANCHORS = np.array([[2.0, 0.0, 0.2], [-1.0, 2.0, 0.0], [-1.0, -2.0, 0.5]])
+"""Fixed points for a tape, as somebody places them in frame 1."""
+
+
+def taped(rng, boom, offset, q, place):
+    """Rows of a file: readings, distance from each anchor, anchor. The boom stands a little elsewhere than it is thought to."""
+    at = q - printed_wind_up(boom, q)
+    tips = forward_kinematics(boom, at).position @ place[0].T + place[1]
+    rows = []
+    for anchor in ANCHORS:
+        d = np.linalg.norm(tips - anchor, axis=-1) + NOISE * rng.normal(size=len(q))
+        rows.append(np.column_stack([q - offset, d, np.tile(anchor, (len(q), 1))]))
+    return np.concatenate(rows)
+
+
+def test_a_tape_from_three_points_calibrates_as_well_as_its_noise_allows(tmp_path):
+    rng = np.random.default_rng(23)
+    lengths = {"L2": 0.0315, "L4": 1.002, "L7": 0.7575, "upper_less_lower": 0.002, "inner_less_outer": -0.002}
+    true = replace(BOOM, geometry=replace(BOOM.geometry, **lengths))
+    offset = np.array([0.0, 0.006, -0.008, 0.0, 0.01])
+    place = Rotation.from_euler("xyz", [2.0, -1.0, 4.0], degrees=True).as_matrix(), np.array([0.1, -0.05, 0.08])
+    for name, q in (("tape.csv", suggest_poses(BOOM, 30, tip_sd=NOISE).q), ("others.csv", poses(rng, 15))):
+        rows = taped(rng, true, offset, q, place)
+        header = "q1,q2,q3,q4,q5,d,ax,ay,az"
+        np.savetxt(tmp_path / name, rows, delimiter=",", header=header, comments="", fmt="%.9g")
+    found = calibrate(BOOM, read_measurements(tmp_path / "tape.csv", NOISE))
+    check = found.checked_on(read_measurements(tmp_path / "others.csv", NOISE))
+    assert check.before > 8.0 * check.after
+    assert check.after < 1.5 * check.expected
+    values = {p.name: (p.value, p.sd) for p in found.parameters if p.sd is not None}
+    for name, true_value in (
+        (UPPER, 0.002),
+        (INNER, -0.002),
+        ("inner offset", 0.006),
+        ("lower offset", -0.008),
+        ("L2", 0.0315),
+    ):
+        value, sd = values[name]
+        assert abs(value - true_value) < 4.0 * sd
+    assert any("measured by their distance" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "said"),
+    [
+        ("q1,q2,q3,q4,q5,d", "0,1,2,0,0,1.5", "column ax is missing"),
+        ("q1,q2,q3,q4,q5,ax,ay,az", "0,1,2,0,0,1,1,1", "column d is missing"),
+        ("q1,q2,q3,q4,q5,d,ax,ay,az", "0,1,2,0,0,1.5,1,,0", "has a distance d, but not all of ax, ay, az"),
+        (
+            "q1,q2,q3,q4,q5,d,ax,ay,az",
+            "0,1,2,0,0,1500,1,0,0",
+            "distance of pose 1 is 1500; it must be above 0 and at most 100 m",
+        ),
+        ("q1,q2,q3,q4,q5,x,y,z,d,ax,ay,az", "0,1,2,0,0,1,1,1,1.5,1,0,0", "pose 1 has a distance and coordinates"),
+    ],
+)
+def test_a_wrong_tape_is_named(tmp_path, header, row, said):
+    (tmp_path / "tape.csv").write_text(f"{header}\n{row}\n")
+    with pytest.raises(InputError, match=said):
+        read_measurements(tmp_path / "tape.csv")
+
+
+def slipped(change):
+    """Measurements of the shipped boom in another frame, with a slip."""
+    rng = np.random.default_rng(31)
+    q = poses(rng, 24)
+    R, t = Rotation.from_euler("xyz", [2.0, -1.0, 130.0], degrees=True).as_matrix(), np.array([3.0, 2.0, 0.4])
+    tip = forward_kinematics(BOOM, q - printed_wind_up(BOOM, q)).position @ R.T + t + NOISE * rng.normal(size=(24, 3))
+    return Measurements.of(*change(q, tip), NOISE, name="tips.csv")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda q, x: (q * [1, -1, 1, 1, 1], x), r"q2 \(inner\) looks turned round: multiply it by -1"),
+        (lambda q, x: (q[:, [0, 2, 1, 3, 4]], x), "look swapped"),
+        (lambda q, x: (q, np.roll(x, 1, axis=0)), "each tip looks like that of the row one earlier"),
+        (lambda q, x: (q, x * [1, -1, 1]), "multiply it by -1, or make the measuring frame right-handed"),
+        (lambda q, x: (q, x * 3.28084), "look like feet; they must be in m"),
+        (lambda q, x: (q, x[np.random.default_rng(1).permutation(len(x))]), "check the units, the signs of the joints"),
+    ],
+)
+def test_a_slip_is_named_instead_of_fitted(change, said):
+    with pytest.raises(InputError, match=said):
+        calibrate(BOOM, slipped(change))
+
+
+def test_a_joint_that_never_moves_is_named():
+    def fixed(q, x):
+        at = np.array(q)
+        at[:, 4] = 0.3
+        return at, forward_kinematics(BOOM, at - printed_wind_up(BOOM, at)).position
+
+    found = calibrate(BOOM, slipped(fixed), known_frame=True)
+    assert "wrist never moves (all at 17.19 deg): measure poses that differ in it, too (--suggest)" in found.notes
+    assert "wrist offset" not in found.free or "L8" not in found.free

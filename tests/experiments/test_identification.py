@@ -14,7 +14,7 @@ import pytest
 from boom_model import Basis, Boom, InputError, inverse_dynamics
 from boom_model.arrays import Array, read_only
 from boom_model.boom import Body
-from planner.experiments.comparison import Log, compare
+from planner.experiments.comparison import Log
 from planner.experiments.identification import Identification, identify, with_dynamics
 from planner.experiments.measured_boom import write_identified
 from planner.experiments.payload import SURE, identify_payload
@@ -126,19 +126,6 @@ def test_the_boom_file_is_measured_and_gives_the_same_torques(tmp_path: Path) ->
         assert body.origin.basis is Basis.MEASURED
     assert all(origin is not None and origin.basis is Basis.MEASURED for origin in read.friction.origins)
     assert "[joints.inner.drive]" in file.read_text(encoding="utf-8")
-
-
-def test_compare_shows_the_torques_before_and_after() -> None:
-    rng = np.random.default_rng(2)
-    perturbed(BOOM, rng)
-    t = measured(2).log.t
-    planned = Trajectory.from_samples(t, *fourier(BOOM, rng)(t))
-    answer = compare(BOOM, planned, measured(2).log, after=identified(2).boom).to_json({})
-    for joint in answer["joints"]:
-        torque = joint["torque"]
-        assert torque["logged_less_after"]["rms"] < torque["logged_less_measured"]["rms"]
-        assert torque["parts"]["friction"] == 0.0
-        assert torque["parts_after"]["friction"] > 0.0
 
 
 def turned(log: Log) -> Log:

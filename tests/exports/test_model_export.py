@@ -13,11 +13,11 @@ import pytest
 import yourdfpy
 
 from boom_model import JOINTS, Boom, InputError, forward_kinematics, gravity_torque, inverse_dynamics, mass_matrix
-from boom_model.arrays import Array
-from boom_model.boom import Body
+from boom_model.arrays import Array, read_only
+from boom_model.boom import Body, Friction
 from boom_model.drives.drive import drive_torque_limit, reflected_inertia
 from planner import plan
-from planner.exports.robot_models import UNLIMITED_EFFORT, mjcf, urdf, write_model
+from planner.exports.robot_models import UNLIMITED_EFFORT, left_out, mjcf, urdf, write_model
 from tests.oracles import BOOMS, errors, random_states
 
 BOOM = Boom.load()
@@ -280,3 +280,13 @@ def test_another_ending_is_refused(tmp_path: Path):
     with pytest.raises(InputError, match=r"must end in \.urdf"):
         write_model(BOOM, tmp_path / "boom.sdf")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_model_cannot_carry_of_a_measured_boom_is_said():
+    friction = Friction(read_only([1, 2, 3, 4, 5]), read_only([1, 2, 3, 4, 5]), (None,) * 5, read_only([0, 0.5, 0, -1, 0]))
+    boom = replace(Boom.load(), friction=friction)
+    (said,) = left_out(boom)
+    assert "inner 0.5 Nm, extension -1 N" in said
+    assert left_out(Boom.load()) == ()
+    for text in (urdf(boom), mjcf(boom)):
+        assert "the asymmetric part is left out" in text
