@@ -180,6 +180,9 @@ def measure_rig(
     notes = [*log.notes, *points.notes, *(() if joints is None else joints.notes)]
     notes += [f"assumed: {each}" for each in rig.assumptions]
     notes.append("the rig's file has no correlations between figures; the covariance is in the JSON")
+    notes.append("errors are taken as independent from one point to the next; slow ones of GNSS make the deviations too small")
+    if LEVER[0] in free:
+        notes.append("the lever arm from antenna to mount is what was measured; geotags still count std_m of both ends")
     if at_sensor:
         notes.append("backlash and hysteresis of the boom are the same all through a manoeuvre: the deviations leave them out")
     return Measured(
