@@ -22,7 +22,7 @@ _COLOURS = "viridis"
 def map_figure(
     plots: PlotMap, points: Array | None = None, coverage: Array | None = None, track: Array | None = None
 ) -> Figure:
-    """Return the map with points (n, 2) and a track (m, 2) [m], coloured by the share of each plot that was seen."""
+    """Return the map with points (n, 2) and a track (m, 2) [m], coloured by the share seen."""
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -42,7 +42,7 @@ def map_figure(
 
 
 def draw_plots(axes: Axes, plots: PlotMap, colours: Any) -> None:
-    """Draw outlines of plots, filled with one colour or one each, and their names where there is room."""
+    """Draw outlines of plots, filled with one colour or one each, and names where there is room."""
     outlines = [rings_of(polygon)[0] for polygon in plots.polygons]
     axes.add_collection(PolyCollection(outlines, facecolors=colours, edgecolors="#3c5a2e", linewidths=0.8))
     if len(outlines) <= _LABELLED:

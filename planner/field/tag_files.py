@@ -1,4 +1,4 @@
-"""Files of geotags: a table as CSV or GeoParquet, and points with footprints as GeoJSON for QGIS."""
+"""Files of geotags: a table as CSV or GeoParquet, points with footprints as GeoJSON for QGIS."""
 
 import csv
 import json
@@ -61,7 +61,7 @@ def write_table(path: str | Path, tags: SensorTags, rows: list[dict[str, Any]]) 
 
 
 def _write_geoparquet(path: str | Path, tags: SensorTags, rows: list[dict[str, Any]]) -> None:
-    """Write GeoParquet 1.1: the sensor's position as `geometry` with its height, what it saw as `footprint`.
+    """Write GeoParquet 1.1: the sensor's position as `geometry`, what it saw as `footprint`.
 
     Source: https://geoparquet.org/releases/v1.1.0/
     """
@@ -117,7 +117,7 @@ def _point(row: dict[str, Any]) -> list[float]:
 
 
 def _ring(tags: SensorTags, k: int) -> list[list[float]] | None:
-    """Return longitude, latitude [deg] of a footprint, anticlockwise and closed; None where there is none."""
+    """Return longitude, latitude [deg] of a footprint, anticlockwise and closed; None for none."""
     if not np.isfinite(tags.footprint[k]).all():
         return None
     latitude, longitude, _ = geodetic_of(tags.footprint[k])

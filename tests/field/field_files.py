@@ -1,4 +1,5 @@
-"""A field day as files: a vehicle that drives past plots, its boom that sweeps, and what sees what, known exactly."""
+"""A field day as files: a vehicle that drives past plots, its boom that sweeps, and what sees what,
+known exactly."""
 
 from pathlib import Path
 
@@ -71,7 +72,8 @@ def joint_position(t: Array) -> Array:
 
 
 def sensor_on_vehicle(boom: Boom, q: Array) -> tuple[Array, Array]:
-    """Position (n, 3) and turn R_body_11 (n, 3, 3) of the sensor, written out without the code under test."""
+    """Position (n, 3) and turn R_body_11 (n, 3, 3) of the sensor, written out without the code
+    under test."""
     tip = forward_kinematics(boom, q)
     turn = np.radians(2.0)  # heading -2 deg is anticlockwise
     R = np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
@@ -111,7 +113,8 @@ def write_field(
 
 
 def write_points(place: Path, drive: Drive, t: Array, r: Array, *, utc: float = 1.7830e9, seed: int = 0) -> None:
-    """Write a total station's positions of a point at r (3,) or (n, 3) of the vehicle, each to 3 mm."""
+    """Write a total station's positions of a point at r (3,) or (n, 3) of the vehicle, each to 3
+    mm."""
     noisy = drive.frame.enu(drive.point(t, r)) + np.random.default_rng(seed).normal(0.0, 0.003, (len(t), 3))
     latitude, longitude, height = geodetic_of(drive.frame.ecef(noisy))
     rows = zip(utc + t, np.degrees(latitude), np.degrees(longitude), height, strict=True)
@@ -120,7 +123,8 @@ def write_points(place: Path, drive: Drive, t: Array, r: Array, *, utc: float = 
 
 
 def true_spots(boom: Boom, drive: Drive, stamps: Array, q: Array) -> tuple[Array, Array]:
-    """Where the sensor was (n, 3), and the canopy that it saw (n, 3), in east-north-up, by marching along the ray."""
+    """Where the sensor was (n, 3), and the canopy that it saw (n, 3), in east-north-up, by marching
+    along the ray."""
     t = stamps - 0.02
     R = attitude.rotation(*drive.angles(t).T)
     at, turn = sensor_on_vehicle(boom, q)

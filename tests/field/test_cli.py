@@ -140,7 +140,8 @@ def test_plots(boom, day, tmp_path):
 
 
 def test_a_corner_is_a_quarter_of_the_plot(boom, day, tmp_path):
-    """At the corner of a box, an error much smaller than the box puts the point on it in a quarter of cases."""
+    """At the corner of a box, an error much smaller than the box puts the point on it in a quarter
+    of cases."""
     boom("plots", "trial.toml", "--out", "plots.geojson")
     x, y = json.loads((tmp_path / "plots.geojson").read_text())["features"][0]["geometry"]["coordinates"][0][0]
     _, out, _ = boom("plots", "trial.toml", "--json", "--at", f"{y:.10f},{x:.10f}", "--std", "0.05")

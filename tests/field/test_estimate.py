@@ -1,4 +1,5 @@
-"""Injected delays, lever arms and mounting angles are found again, as well as their covariance says."""
+"""Injected delays, lever arms and mounting angles are found again, as well as their covariance
+says."""
 
 import numpy as np
 import pytest
@@ -34,7 +35,8 @@ def test_a_delay_of_100_ms_and_a_lever_arm_wrong_by_5_cm_are_found():
 
 
 def test_errors_are_as_the_covariance_says():
-    """The sum of normalised squares over 15 drives lies within the 99.9 % band of its chi-square."""
+    """The sum of normalised squares over 15 drives lies within the 99.9 % band of its
+    chi-square."""
     total = 0.0
     for seed in range(15):
         log = DRIVE.log(T, ANTENNA, 0.0143, seed=100 + seed)
@@ -47,7 +49,8 @@ def test_errors_are_as_the_covariance_says():
 
 
 def test_mounting_angles_of_the_boom_are_found():
-    """The boom sweeps while the vehicle drives; its mount is turned by 0.5, -0.8 and 1.2 deg more than the rig says."""
+    """The boom sweeps while the vehicle drives; its mount is turned by 0.5, -0.8 and 1.2 deg more
+    than the rig says."""
     boom, random = Boom.load(), np.random.default_rng(5)
     mount, turned = np.array([1.2, 0.6, 0.5]), np.radians([0.5, -0.8, 1.2])
 
@@ -67,7 +70,8 @@ def test_mounting_angles_of_the_boom_are_found():
 
 
 def test_a_straight_drive_is_refused():
-    """At a steady speed and attitude, a delay and a lever arm along the track are the same thing."""
+    """At a steady speed and attitude, a delay and a lever arm along the track are the same
+    thing."""
     straight = Drive(turning=1e-9, sway=0.0, heave=0.0)
     log = straight.log(T, ANTENNA, 0.01)
     with pytest.raises(InputError, match="it must turn, and change its speed"):

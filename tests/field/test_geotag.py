@@ -18,7 +18,8 @@ TRIGGERS = np.arange(1.0, 38.0, 0.251)
 
 @pytest.mark.parametrize("place", [(52.13, -106.62), (-42.9, 147.3), (-17.0, 179.9999), (52.0, -108.0), (89.9999, 0.0)])
 def test_points_of_an_exact_motion(place):
-    """Linear interpolation errs by a dt^2 / 8: 34 urad of attitude on 3.5 m of lever arm; a cubic of position hardly at all."""
+    """Linear interpolation errs by a dt^2 / 8: 34 urad of attitude on 3.5 m of lever arm; a cubic
+    of position hardly at all."""
     drive = Drive(frame=LocalFrame.at(*np.radians(place), 300.0))
     for velocity, at_antenna, at_sensor in ((False, 1.5e-4, 2e-4), (True, 1e-6, 1.5e-4)):
         found = geotag(_exact_log(drive, velocity), {"antenna": np.zeros(3), "sensor": SENSOR - ANTENNA}, TRIGGERS)
@@ -28,7 +29,8 @@ def test_points_of_an_exact_motion(place):
 
 
 def _exact_log(drive, velocity):
-    """The log with headings from the north of each fix, which near a pole is not that of the frame."""
+    """The log with headings from the north of each fix, which near a pole is not that of the
+    frame."""
     log = drive.log(T, ANTENNA, velocity=velocity)
     latitude, longitude, height = geodetic_of(log.ecef)
     R_ecef_body = drive.frame.R_ecef_enu @ attitude.rotation(*drive.angles(T).T)
@@ -123,7 +125,8 @@ def _covariance(random, size):
 
 
 def test_simulated_field_errs_as_predicted():
-    """20 Hz RTK with white noise: half-way between fixes noise averages out, so the prediction is an upper bound."""
+    """20 Hz RTK with white noise: half-way between fixes noise averages out, so the prediction is
+    an upper bound."""
     drive = Drive()
     found = geotag(drive.log(T, ANTENNA, 0.0143, np.radians(0.1), velocity=False, seed=4), {"s": SENSOR - ANTENNA}, T[20:-20])
     off = (found["s"].ecef - drive.point(T[20:-20], SENSOR)) @ SASKATOON.R_ecef_enu

@@ -1,4 +1,5 @@
-"""Logs as files: every form, what is assumed, a refusal that names the line, and a thousand mutated logs."""
+"""Logs as files: every form, what is assumed, a refusal that names the line, and a thousand mutated
+logs."""
 
 import re
 from datetime import UTC, datetime
@@ -45,7 +46,8 @@ def test_every_form_of_position_gives_the_same(tmp_path):
 
 
 def test_clocks_give_the_same_instants(tmp_path):
-    """15:00:00 UTC on 1 July 2026 in four ways; GPS time is 18 s ahead, and its week began on Sunday 28 June."""
+    """15:00:00 UTC on 1 July 2026 in four ways; GPS time is 18 s ahead, and its week began on
+    Sunday 28 June."""
     instant = datetime(2026, 7, 1, 15, 0, 0, tzinfo=UTC).timestamp()
     week = (datetime(2026, 6, 28, tzinfo=UTC) - datetime(1980, 1, 6, tzinfo=UTC)).days // 7
     gps = week * 604800 + 3 * 86400 + 15 * 3600 + 18

@@ -57,7 +57,8 @@ def test_files_there_and_back(form, tmp_path):
 
 
 def test_geopackage_as_qgis_writes_it(tmp_path):
-    """Multipolygons in UTM with heights, numbers with a blank as names, beside a table and a layer of points."""
+    """Multipolygons in UTM with heights, numbers with a blank as names, beside a table and a layer
+    of points."""
     plots, _ = trial()
     place = tmp_path / "field.gpkg"
     rings = [coordinates_in(32613, ecef_of(*plot[0].T, 480.0)) for plot in plots.rings[:3]]
@@ -175,7 +176,8 @@ def test_without_error_it_is_inside_or_not():
 
 
 def test_probabilities_are_calibrated():
-    """Of points said to be on their plot with a probability in a band, that share is on it (a reliability diagram)."""
+    """Of points said to be on their plot with a probability in a band, that share is on it (a
+    reliability diagram)."""
     plots, random, n = trial()[0], np.random.default_rng(3), 20_000
     west, south, east, north = shapely.MultiPolygon(plots.polygons).bounds
     true = random.uniform([west - 1.0, south - 1.0], [east + 1.0, north + 1.0], (n, 2))
