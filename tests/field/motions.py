@@ -69,8 +69,8 @@ class Drive:
         velocity: bool = False,
         seed: int = 0,
     ) -> VehicleLog:
-        """The log of an antenna at some time stamps, with white noise; `late` is how late they
-        are."""
+        """The log of an antenna at some time stamps, with white noise; `late` is how
+        late they are."""
         random, true = np.random.default_rng(seed), t - late
         ecef = self.point(true, antenna) + random.normal(0.0, position_std, (len(t), 3)) @ self.frame.R_ecef_enu.T
         noisy = self.angles(true) + random.normal(0.0, angle_std, (len(t), 3))

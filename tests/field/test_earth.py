@@ -92,8 +92,8 @@ def test_utm_zone_and_the_way_there_and_back(place, epsg):
 
 
 def test_central_meridian_of_a_utm_zone():
-    """On the central meridian the easting is 500 km, and the northing 0.9996 of the meridian's
-    arc."""
+    """On the central meridian the easting is 500 km, and the northing 0.9996 of the
+    meridian's arc."""
     ecef = earth.ecef_of(np.radians(52.0), np.radians(-105.0), 0.0)
     x, y, _ = earth.coordinates_in(32613, ecef)
     assert x == pytest.approx(500_000.0, abs=1e-6)

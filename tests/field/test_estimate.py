@@ -70,8 +70,8 @@ def test_mounting_angles_of_the_boom_are_found():
 
 
 def test_a_straight_drive_is_refused():
-    """At a steady speed and attitude, a delay and a lever arm along the track are the same
-    thing."""
+    """At a steady speed and attitude, a delay and a lever arm along the track are the
+    same thing."""
     straight = Drive(turning=1e-9, sway=0.0, heave=0.0)
     log = straight.log(T, ANTENNA, 0.01)
     with pytest.raises(InputError, match="it must turn, and change its speed"):

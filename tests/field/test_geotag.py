@@ -29,8 +29,8 @@ def test_points_of_an_exact_motion(place):
 
 
 def _exact_log(drive, velocity):
-    """The log with headings from the north of each fix, which near a pole is not that of the
-    frame."""
+    """The log with headings from the north of each fix, which near a pole is not that
+    of the frame."""
     log = drive.log(T, ANTENNA, velocity=velocity)
     latitude, longitude, height = geodetic_of(log.ecef)
     R_ecef_body = drive.frame.R_ecef_enu @ attitude.rotation(*drive.angles(T).T)

@@ -82,8 +82,8 @@ def test_sag_is_down_and_counts(day):
 
 
 def test_lever_arms_covariance_equals_samples(day):
-    """Every part of the rig moved at random, at ten poses; the formula is written out again
-    here."""
+    """Every part of the rig moved at random, at ten poses; the formula is written out
+    again here."""
     boom, (rig, *_) = Boom.load(), day
     random, count = np.random.default_rng(7), 40_000
     backlash = play(boom)[0]
