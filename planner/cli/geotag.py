@@ -76,15 +76,15 @@ def geotag(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Say where the sensor at the boom's end was at every trigger, what it saw, and how sure that is.
+    """Say where the sensor at the boom's end was at every trigger, what it saw, how sure that is.
 
-    VEHICLE is CSV or NMEA: time, position, attitude and their deviations. JOINTS has a time and q1..q5.
-    A time is `utc`, `gps_s`, or `t` of one clock for all. Angles: heading clockwise from true north,
-    pitch nose up, roll right side down.
+    VEHICLE is CSV or NMEA: time, position, attitude and their deviations. JOINTS has a time and
+    q1..q5. A time is `utc`, `gps_s`, or `t` of one clock for all. Angles: heading clockwise from
+    true north, pitch nose up, roll right side down.
 
     \b
     Example:
-      boom geotag vehicle.csv joints.csv triggers.csv --rig rig.toml --plots trial.toml --out tags.csv
+      boom geotag vehicle.csv joints.csv triggers.csv --rig rig.toml --plots plots.gpkg --out t.csv
     """
     from planner.field.log_files import read_joint_log, read_triggers, read_vehicle_log
     from planner.field.on_plots import locate_spots, map_at, zone_of
@@ -169,8 +169,8 @@ def rig(
 ) -> int:
     """Measure the rig: how late the logs are, lever arm and mounting angles, from a manoeuvre.
 
-    The vehicle turned and changed its speed while a total station or a second receiver measured one point. POINTS has a
-    time and a position in any form of VEHICLE.
+    The vehicle turned and changed its speed while a total station or a second receiver measured
+    one point. POINTS has a time and a position in any form of VEHICLE.
 
     \b
     delay         how late VEHICLE's stamps are, POINTS' taken as true

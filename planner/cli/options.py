@@ -136,7 +136,7 @@ def boom_option(command: _Command) -> _Command:
 def figure_option(
     name: str, quantity: Range, metavar: str, help: str, default: float | None = None
 ) -> Callable[[_Command], _Command]:
-    """Return an option that takes a number within the range of a quantity, and shows its default if it has one.
+    """Return an option that takes a number within the range of a quantity.
 
     Args:
         name: with its dashes.

@@ -1,4 +1,4 @@
-"""A vehicle's log from several antennas on it: position of their middle, and attitude from the lines between them.
+"""A vehicle's log from several antennas: position of their middle, attitude from their baselines.
 
 With positions p_i measured and places b_i on the body, both from their mean, the attitude R is the
 one of least squares (Wahba's problem):
@@ -92,7 +92,7 @@ def _note(source: str, std: float) -> str:
 
 
 def _level(body: Array, enu: Array, line: Array, source: str) -> Array:
-    """Return the attitude of antennas on a line: the line as measured, the body's up as near to the vertical as may be."""
+    """Return the attitude of antennas on a line: the line as measured, up nearest to vertical."""
     measured = enu.T @ (body @ line)
     measured /= np.linalg.norm(measured)
     if abs(line[2]) > _STEEPEST or abs(measured[2]) > _STEEPEST:

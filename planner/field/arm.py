@@ -1,4 +1,4 @@
-"""From the antenna over the mount and the arm to a point of the sensor: the lever arm, its rate and its covariance.
+"""Lever arm from the antenna over mount and arm to the sensor, its rate and its covariance.
 
     r = r_mount + R_body_mount (p_11(q) + R_1_11(q) x) - r_antenna
 
@@ -21,7 +21,7 @@ _UNEVEN = 1.0 / np.sqrt(3.0)
 
 
 def yielding(boom: Boom, q: Array, up: Array) -> Array:
-    """Return the joint position (n, 5) that the arm takes at rest where its motors stand at q (n, 5).
+    """Return the joint positions (n, 5) of the arm at rest where its motors stand at q (n, 5).
 
     Args:
         boom: the boom.
@@ -38,14 +38,14 @@ def yielding(boom: Boom, q: Array, up: Array) -> Array:
 
 
 def up_in_mount(rig: Rig, ecef: Array, R_ecef_body: Array) -> Array:
-    """Return the unit vectors (n, 3) against gravity along frame 1, where the vehicle is at ecef (n, 3) [m]."""
+    """Return unit vectors (n, 3) against gravity along frame 1, at places ecef (n, 3) [m]."""
     latitude, longitude, _ = geodetic_of(ecef)
     up: Array = np.einsum("nij,ni->nj", R_ecef_body, axes(latitude, longitude)[..., 2]) @ rig.R_body_mount
     return up
 
 
 def play(boom: Boom) -> tuple[Array, tuple[str, ...]]:
-    """Return the standard deviation (5,) [rad, m] of each joint by its drive, and what is not known of it."""
+    """Return the standard deviation (5,) [rad, m] of the joints by their drives, and unknowns."""
     variance, unknown = np.zeros(5), []
     for i, drive in enumerate(boom.drives):
         if drive is None:

@@ -1,4 +1,4 @@
-"""What is assumed where a vehicle's log does not say it: standard deviations, and a heading from the track."""
+"""What is assumed where a log does not say it: standard deviations, a heading from the track."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ _BASELINE = 0.5  # [m] over which a heading is taken from the track
 
 
 def covariance_of_quality(quality: NDArray[np.int_], source: str, *, known: bool = True) -> tuple[Array, tuple[str, ...]]:
-    """Return covariances (n, 3, 3) [m^2] assumed from NMEA's quality, and the note that they are."""
+    """Return covariances (n, 3, 3) [m^2] assumed from NMEA's quality, and a note that they are."""
     std = np.array([STD_OF_QUALITY.get(int(each), STD_OF_QUALITY[1]) for each in quality])
     spread = std[:, None] * [1.0, 1.0, _UP]
     figures = ", ".join(f"{each:g} m" for each in sorted(set(std)))
@@ -35,7 +35,7 @@ def track_note(source: str) -> str:
 
 
 def heading_of_track(ecef: Array, source: str) -> Array:
-    """Return headings (n,) [rad] of a track (n, 3): towards the first fix 0.5 m on, from the last one 0.5 m back.
+    """Return headings (n,) [rad] of a track (n, 3): from the fix 0.5 m back to that 0.5 m ahead.
 
     Raises:
         InputError: the track is shorter than that.

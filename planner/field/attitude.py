@@ -32,7 +32,7 @@ def rotation(roll: ArrayLike, pitch: ArrayLike, heading: ArrayLike) -> Array:
 
 
 def angles(R_enu_body: ArrayLike) -> Array:
-    """Return roll, pitch and heading (..., 3) [rad] of R_enu_body (..., 3, 3); heading in [0, 2 pi)."""
+    """Return roll, pitch, heading in [0, 2 pi) (..., 3) [rad] of R_enu_body (..., 3, 3)."""
     R = np.asarray(R_enu_body, dtype=float)
     R_n_b = _NED_ENU @ R @ _FRD_FLU
     # The same as Rotation.as_euler("ZYX"), which warns where the nose points straight up.
@@ -43,7 +43,7 @@ def angles(R_enu_body: ArrayLike) -> Array:
 
 
 def error_axes(R_enu_body: ArrayLike) -> Array:
-    """Return the axes (..., 3, 3), as columns in east-north-up, about which roll, pitch and heading turn the body.
+    """Return the axes (..., 3, 3) of roll, pitch and heading, as columns in east-north-up.
 
     A small error d of the three angles moves the point R r by sum_i d_i (axis_i x R r). Roll turns
     about the body's forward axis, heading about the vertical (down), and pitch about the horizontal
@@ -58,7 +58,7 @@ def error_axes(R_enu_body: ArrayLike) -> Array:
 
 
 def of_directions(body: ArrayLike, enu: ArrayLike) -> Array:
-    """Return the R_enu_body (3, 3) that turns directions (k, 3) of the body into those measured, by least squares (Wahba).
+    """Return the R_enu_body (3, 3) that fits measured directions (k, 3) best (Wahba's problem).
 
     Raises:
         InputError: fewer than two directions that are not parallel.

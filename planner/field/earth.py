@@ -47,9 +47,10 @@ def _transformer(source: int, target: int) -> Any:
 
 
 def transform(source: int, target: int, x: ArrayLike, y: ArrayLike, z: ArrayLike) -> Array:
-    """Return coordinates (..., 3) in another reference system, in the order x or longitude, y or latitude, height.
+    """Return coordinates (..., 3) in another reference system.
 
-    Angles are in degrees here. A height stays above the ellipsoid where a system has two dimensions.
+    The order is x or longitude, y or latitude, height; angles are in degrees here. A height stays
+    above the ellipsoid where a system has two dimensions.
 
     Raises:
         InputError: a code is not known, or a point cannot be transformed.
@@ -77,13 +78,13 @@ def ecef_of(latitude: ArrayLike, longitude: ArrayLike, height: ArrayLike) -> Arr
 
 
 def geodetic_of(ecef: ArrayLike) -> tuple[Array, Array, Array]:
-    """Return latitude, longitude [rad] and height [m], each (...), of ECEF positions (..., 3) [m]."""
+    """Return latitude, longitude [rad], height [m], each (...), of ECEF positions (..., 3) [m]."""
     longitude, latitude, height = np.moveaxis(transform(GEOCENTRIC, GEODETIC, *np.moveaxis(np.asarray(ecef), -1, 0)), -1, 0)
     return np.radians(latitude), np.radians(longitude), height
 
 
 def ecef_from(epsg: int, x: ArrayLike, y: ArrayLike, height: ArrayLike) -> Array:
-    """Return ECEF positions (..., 3) [m] of coordinates of an EPSG code (easting, northing; or longitude, latitude in deg).
+    """Return ECEF positions (..., 3) [m] of coordinates in an EPSG code; angles in degrees.
 
     Raises:
         InputError: the code is not known, or a point is outside the area where the system is used;
@@ -100,7 +101,7 @@ def ecef_from(epsg: int, x: ArrayLike, y: ArrayLike, height: ArrayLike) -> Array
 
 
 def coordinates_in(epsg: int, ecef: ArrayLike) -> Array:
-    """Return coordinates (..., 3) in an EPSG code: easting, northing [m] or longitude, latitude [deg], ellipsoidal height [m].
+    """Return coordinates (..., 3) in an EPSG code [m, angles in deg], height above the ellipsoid.
 
     Raises:
         InputError: the code is not known, or a point cannot be transformed.
@@ -113,7 +114,7 @@ def coordinates_in(epsg: int, ecef: ArrayLike) -> Array:
 
 
 def utm_zone(latitude: float, longitude: float) -> int:
-    """Return the EPSG code of the UTM zone on WGS 84 of a position [rad]; near the poles, that of UPS."""
+    """Return the EPSG code of the UTM zone of a position [rad]; near the poles, that of UPS."""
     pyproj = library("pyproj")
     if np.degrees(latitude) >= 84.0:
         return 32661

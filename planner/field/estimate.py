@@ -177,14 +177,17 @@ def estimate(
 
 
 def _made_up(log: VehicleLog, weight: Array, variance: Array) -> float:
-    """Return the information on the time [1/s^2] that the noise of the smoothed velocity pretends: 12 s^2 / (n^3 dt^2) each."""
+    """Return the information on the time [1/s^2] that noise of the smoothed velocity pretends.
+
+    It is 12 s^2 / (n^3 dt^2) for each coordinate.
+    """
     dt = float(np.median(np.diff(log.t)))
     count = max(_SMOOTH / dt, 2.0)
     return float((weight**2 * 3.0 * 12.0 * variance / (count**3 * dt**2)).sum())
 
 
 def _smoothed(log: VehicleLog) -> VehicleLog:
-    """Return the log with its positions smoothed by parabolas over a second, for slopes that noise does not make up."""
+    """Return the log smoothed by parabolas over a second, for slopes without made-up noise."""
     count = int(_SMOOTH / float(np.median(np.diff(log.t)))) // 2 * 2 + 1
     if count < 5 or count > len(log.t):
         return log

@@ -1,4 +1,4 @@
-"""Where points of a rigid body were, from the log of one of its points: position and first-order covariance.
+"""Where points of a rigid body were, from the log of one of them, with first-order covariance.
 
     p = p_antenna + R_enu_body r,   r = r_point - r_antenna
 
@@ -66,7 +66,7 @@ class LeverArm:
 
     @staticmethod
     def of(r: ArrayLike, covariance: ArrayLike = 0.0, rate: ArrayLike = (0.0, 0.0, 0.0)) -> "LeverArm":
-        """Return a lever arm from arrays; a covariance of one number is that number times the unit matrix.
+        """Return a lever arm from arrays; a number as covariance is that times the unit matrix.
 
         Raises:
             InputError: an array is not finite or has the wrong shape.
@@ -138,7 +138,7 @@ class Geotags:
 
     @property
     def ellipses(self) -> Array:
-        """(n, 3) of the 95 % ellipse of the horizontal position: half axes [m], and the long one's angle from north [rad]."""
+        """(n, 3) horizontal 95 % ellipses: half axes [m], the long one's angle from north [rad]."""
         return ellipses(self.covariance[:, :2, :2])
 
 
@@ -271,7 +271,7 @@ def state_at(log: VehicleLog, times: Array, latencies: Latencies) -> State:
 
 
 def clock_doubts(source: str, times: Array, log_source: str, log_times: Array) -> tuple[str, ...]:
-    """Return what is odd between two logs' times: offsets of whole half hours, or of GPS time's 18 s."""
+    """Return what is odd between two logs' times: offsets of half hours, or of GPS time's 18 s."""
     if not len(times) or not len(log_times):
         return ()
     ends = times[0] - log_times[0], times[-1] - log_times[-1]

@@ -1,4 +1,4 @@
-"""Intervals of a log: between which two samples a time lies, and why it may not be interpolated there."""
+"""Intervals of a log: between which samples a time lies, and why it may not be used there."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ Indices = NDArray[np.int_]
 def intervals(
     t: Array, stamps: Array, source: str, lines: Indices, flaws: Sequence[tuple[str, Array, str]]
 ) -> tuple[Indices, Array, tuple[str, ...]]:
-    """Return the interval of each time, the share of it that has passed, and why it may not be used ("" where it may).
+    """Return the interval of each time, the share of it that has passed, and why it is refused.
 
     Args:
         t: (n,) times of the samples, increasing [s].

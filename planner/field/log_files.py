@@ -120,10 +120,11 @@ def read_vehicle_log(path: str | Path, epsg: int | None = None, longest_gap: flo
 
 
 def read_joint_log(path: str | Path) -> JointLog:
-    """Read measured joint positions: a column of time and q1..q5 [rad, q4 in m]; further columns of a motion may stand there.
+    """Read measured joint positions: a time and q1..q5 [rad, q4 in m].
 
     Raises:
-        InputError: it cannot be read, is malformed, or looks like degrees or millimetres; names the line.
+        InputError: it cannot be read, is malformed, or looks like degrees or millimetres; names
+            the line.
     """
     table, notes = read_table(path, JOINT_COLUMNS)
     names = [f"q{i + 1}" for i in range(5)]
@@ -147,7 +148,7 @@ def read_joint_log(path: str | Path) -> JointLog:
 
 
 def read_triggers(path: str | Path) -> Triggers:
-    """Read the times of a sensor's measurements: a column of time, and `label` where they have names.
+    """Read the times of a sensor's measurements: a time, and `label` where they have names.
 
     Raises:
         InputError: it cannot be read or is malformed; names the line.
@@ -159,7 +160,7 @@ def read_triggers(path: str | Path) -> Triggers:
 
 
 def read_points(path: str | Path, epsg: int | None = None) -> Points:
-    """Read measured positions of a point: NMEA, or CSV with the time and position columns of a vehicle's log.
+    """Read measured positions of a point: NMEA, or CSV with time and position of a vehicle's log.
 
     Args:
         path: the file.
@@ -323,7 +324,7 @@ def _angle(table: LogTable, name: str) -> Array:
 
 
 def _attitude(table: LogTable, n: int, ecef: Array) -> tuple[Array, Array, tuple[str, ...]]:
-    """Return roll, pitch, heading (n, 3) [rad], their covariance (n, 3, 3), and what of them is assumed."""
+    """Return roll, pitch, heading (n, 3) [rad], their covariance (n, 3, 3), and what is assumed."""
     given = {name: table.has(f"{name}_deg") or table.has(f"{name}_rad") for name in ANGLES[2:]}
     angles, std = np.zeros((n, 3)), np.zeros((n, 3))
     notes, assumed = [], []

@@ -1,4 +1,4 @@
-"""A rig measured from a manoeuvre: the vehicle drove and turned while one of its points was measured from outside.
+"""A rig measured from a manoeuvre, in which one point of the vehicle was measured from outside.
 
 The point is the origin of the mount, a point at a known place of the vehicle, or the sensor at the
 end of the boom, which moves. `estimate` finds the parameters; here they become figures of the rig.
@@ -180,6 +180,9 @@ def measure_rig(
     notes = [*log.notes, *points.notes, *(() if joints is None else joints.notes)]
     notes += [f"assumed: {each}" for each in rig.assumptions]
     notes.append("the rig's file has no correlations between figures; the covariance is in the JSON")
+    notes.append("errors are taken as independent from one point to the next; slow ones of GNSS make the deviations too small")
+    if LEVER[0] in free:
+        notes.append("the lever arm from antenna to mount is what was measured; geotags still count std_m of both ends")
     if at_sensor:
         notes.append("backlash and hysteresis of the boom are the same all through a manoeuvre: the deviations leave them out")
     return Measured(
@@ -214,7 +217,7 @@ def write_measured(path: str | Path, rig_file: str | Path, measured: Measured, s
 
 
 def _swept(boom: Boom, rig: Rig, body: VehicleLog, joints: JointLog) -> Callable[[Array], Array]:
-    """Return the sensor in frame 1 at true times, wind-up under gravity taken off; NaN where the logs do not tell."""
+    """Return the sensor in frame 1 at true times, wind-up taken off; NaN where it is not known."""
 
     def at(times: Array) -> Array:
         state = state_at(body, times, replace(rig.latencies, trigger=0.0))
@@ -286,7 +289,7 @@ def _turn(rig: Rig, turn: Array, std: Array) -> _Part:
 
 
 def _parts(rig: Rig, fit: Estimate, inflation: float, place: Array | None) -> list[_Part]:
-    """Return what was found; `place` is the point on the vehicle, None at the mount or on the boom."""
+    """Return what was found; `place` is the point on the vehicle, None at mount or boom."""
     value = dict(zip(fit.names, fit.values.tolist(), strict=True))
     std = dict(zip(fit.names, (fit.std * inflation).tolist(), strict=True))
 

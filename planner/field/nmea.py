@@ -183,7 +183,10 @@ def _log(path: str, read: _Sentences, longest_gap: float | None) -> VehicleLog:
 
 
 def _attitude(path: str, read: _Sentences, t: Array) -> tuple[Array, Array, tuple[str, ...]]:
-    """Return roll, pitch, heading (n, 3) [rad] at the fixes, NaN where there is no heading, their deviations, and notes."""
+    """Return roll, pitch, heading (n, 3) [rad] at the fixes, their deviations, and notes.
+
+    Without a heading, that is NaN.
+    """
     notes: tuple[str, ...] = ()
     level = f"{path}: no roll and pitch; assumed level, with a standard deviation of {np.degrees(NO_TILT_STD):g} deg"
     angles = np.zeros((len(t), 3))
@@ -201,7 +204,7 @@ def _attitude(path: str, read: _Sentences, t: Array) -> tuple[Array, Array, tupl
 
 
 def _at_fixes(path: str, t: Array, rows: list[tuple[float, float, float, float]]) -> tuple[Array, tuple[str, ...]]:
-    """Return roll, pitch, heading (n, 3) [rad] at the fixes, turned evenly from one row to the next, and a note on gaps.
+    """Return roll, pitch, heading (n, 3) [rad] at the fixes, turned evenly, and a note on gaps.
 
     Args:
         path: the file.

@@ -55,7 +55,7 @@ class _Trial(Table):
 
 
 def read_plots(path: str | Path, epsg: int | None = None) -> PlotMap:
-    """Read a map by the ending of its file: a trial's .toml, .geojson or .json, .gpkg, .shp, or .csv with a column wkt.
+    """Read a map by the ending of its file: a trial's .toml, or one of FORMS.
 
     Args:
         path: the file.

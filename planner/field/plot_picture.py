@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize
+from matplotlib.colors import Normalize, to_rgba_array
 from matplotlib.figure import Figure
 
 from boom_model.arrays import Array
@@ -17,12 +17,13 @@ from planner.field.polygons import rings_of
 
 _LABELLED = 120  # plots with names
 _COLOURS = "viridis"
+_LUMINANCE = np.array([0.299, 0.587, 0.114])  # of red, green and blue
 
 
 def map_figure(
     plots: PlotMap, points: Array | None = None, coverage: Array | None = None, track: Array | None = None
 ) -> Figure:
-    """Return the map with points (n, 2) and a track (m, 2) [m], coloured by the share of each plot that was seen."""
+    """Return the map with points (n, 2) and a track (m, 2) [m], coloured by the share seen."""
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
@@ -42,12 +43,14 @@ def map_figure(
 
 
 def draw_plots(axes: Axes, plots: PlotMap, colours: Any) -> None:
-    """Draw outlines of plots, filled with one colour or one each, and their names where there is room."""
+    """Draw outlines of plots, filled with one colour or one each, and names where there is room."""
     outlines = [rings_of(polygon)[0] for polygon in plots.polygons]
     axes.add_collection(PolyCollection(outlines, facecolors=colours, edgecolors="#3c5a2e", linewidths=0.8))
     if len(outlines) <= _LABELLED:
-        for name, outline in zip(plots.names, outlines, strict=True):
-            axes.annotate(name, outline.mean(axis=0), ha="center", va="center", fontsize=6, clip_on=True)
+        light = np.broadcast_to(to_rgba_array(colours)[:, :3] @ _LUMINANCE, len(outlines))
+        for name, outline, bright in zip(plots.names, outlines, light, strict=True):
+            ink = "black" if bright > 0.4 else "white"
+            axes.annotate(name, outline.mean(axis=0), ha="center", va="center", fontsize=6, color=ink, clip_on=True)
 
 
 def write_picture(

@@ -1,4 +1,4 @@
-"""Maps of plots: laid out from a trial's corners, and asked which plot a point or a footprint is on.
+"""Maps of plots: laid out from a trial's corners, and asked which plot a point is on.
 
 The truth of a map are latitudes and longitudes. Areas and distances are taken in the east-north
 plane at its middle, at the height of its ground: within 1 km it is true to some micrometres.
@@ -96,7 +96,7 @@ class PlotMap:
         return flat
 
     def plane_of(self, ecef: Array) -> Array:
-        """Return east and north (..., 2) [m] in the plane of the map, of ECEF positions (..., 3)."""
+        """Return east and north (..., 2) [m] in the map's plane, of ECEF positions (..., 3)."""
         latitude, longitude, _ = geodetic_of(ecef)
         return self.plane(latitude, longitude)
 
@@ -181,7 +181,7 @@ def require_near(plots: PlotMap, latitude: Array, longitude: Array, source: str)
     """Check that a log lies at the plots.
 
     Raises:
-        InputError: it is more than 100 km away; says so if swapping its coordinates brings it there.
+        InputError: it is more than 100 km away; says so if swapped coordinates are near.
     """
     known = np.isfinite(latitude)
     if not known.any():
@@ -208,7 +208,7 @@ def lay_out(
     source: str = "plots",
     rows_to_right: bool = False,
 ) -> tuple[PlotMap, float]:
-    """Return the plots of a trial from its corners, and how far the corners are from the layout (root mean square) [m].
+    """Return the plots of a trial from its corners, and the corners' RMS distance from them [m].
 
     The trial is a grid of plots and alleys of given sizes. It is laid on the corners by least
     squares, turned and moved but neither stretched nor sheared.
@@ -262,7 +262,7 @@ def lay_out(
 
 
 def _laid(ideal: Array, measured: Array) -> tuple[Array, Array, float]:
-    """Return the turn (2, 2), the move (2,) and the root mean square distance of the best fit of one to the other."""
+    """Return the turn (2, 2), the move (2,) and the RMS distance of the best fit."""
     a, b = ideal - ideal.mean(axis=0), measured - measured.mean(axis=0)
     angle = float(np.arctan2((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum(), (a * b).sum()))
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])

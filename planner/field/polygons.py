@@ -24,7 +24,7 @@ def probability(rings: list[Array], mean: Array, covariance: Array) -> Array:
     """Return the probability (n,) that points lie in a polygon.
 
     Args:
-        rings: the outer ring (k, 2) and its holes, each with its first point again at the end, or not.
+        rings: the outer ring (k, 2) and its holes, each closed or not.
         mean: (n, 2) points [m].
         covariance: (n, 2, 2) of each [m^2].
     """
@@ -43,7 +43,7 @@ def rings_of(polygon: Any) -> list[Array]:
 
 
 def _signed(a: Array, b: Array) -> Array:
-    """Return the probability (...) of each triangle from the origin to an edge a, b (..., 2), positive anticlockwise."""
+    """Return the signed probability (...) of triangles from the origin to edges a, b (..., 2)."""
     edge = b - a
     length = np.maximum(np.linalg.norm(edge, axis=-1), _LEAST_DISTANCE)
     cross = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

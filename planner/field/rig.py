@@ -1,4 +1,4 @@
-"""The rig: where antenna, inertial sensor, mount and sensor are on the vehicle, how late their logs are, and how sure that is.
+"""The rig: where antenna, inertial sensor, mount and sensor are, and how late their logs are.
 
 The vehicle's axes are x forward, y left, z up, from an origin of the user's choice.
 """

@@ -1,4 +1,4 @@
-"""What a sensor at the end of the boom saw, where: its position, its view, and the spot of ground or canopy under it.
+"""Where a sensor at the end of the boom was, and the spot of ground or canopy that it saw.
 
 The spot is where the view meets the canopy, a level plane above the ground under the mount. Its
 covariance is that of the rigid point at that range along the view, moved along the view back into
@@ -58,7 +58,7 @@ class SensorTags:
 
     @property
     def bearing(self) -> Array:
-        """(n,) direction of the view, clockwise from north [rad]; of little use where that is straight down."""
+        """(n,) direction of the view, clockwise from north [rad]; straight down it means little."""
         return np.asarray(np.arctan2(self.view[:, 0], self.view[:, 1]) % (2.0 * np.pi))
 
 
@@ -128,7 +128,7 @@ def tag_sensor(boom: Boom, rig: Rig, log: VehicleLog, joints: JointLog, triggers
 
 
 def joints_at(log: JointLog, stamps: Array) -> tuple[Array, Array, tuple[str, ...]]:
-    """Return joint positions and rates (n, 5) at time stamps (n,), by lines between samples, and why one has none."""
+    """Return joint positions and rates (n, 5) at time stamps (n,), and why one has none."""
     dt = np.diff(log.t)
     gaps = np.where(dt > max(_GAPS * float(np.median(dt)), _SHORTEST_GAP), dt, 0.0)
     k, share, reasons = intervals(log.t, stamps, log.source, log.lines, (("gap", gaps, "s"),))
@@ -137,7 +137,7 @@ def joints_at(log: JointLog, stamps: Array) -> tuple[Array, Array, tuple[str, ..
 
 
 def _depth(rig: Rig, state: State, R: Array, to_enu: Array, sensor: Geotags) -> Array:
-    """Return how far (n,) the canopy is above the sensor, along the vertical [m]; negative below."""
+    """Return how far (n,) the canopy is above the sensor [m]; negative below."""
     ground = np.array([rig.mount[0], rig.mount[1], rig.ground]) - rig.antenna
     antenna_to_sensor = np.einsum("nij,nj->ni", to_enu, sensor.ecef - state.ecef)[:, 2]
     below: Array = (R @ ground)[:, 2] + rig.canopy - antenna_to_sensor
@@ -145,7 +145,7 @@ def _depth(rig: Rig, state: State, R: Array, to_enu: Array, sensor: Geotags) -> 
 
 
 def _corners(rig: Rig, q: Array, boom: Boom, R: Array, to_enu: Array, sensor: Geotags, depth: Array) -> Array:
-    """Return the corners (n, 4, 3) of the footprint in ECEF: where its corner rays meet the canopy."""
+    """Return the corners (n, 4, 3) of the footprint in ECEF, where its rays meet the canopy."""
     turn = R @ rig.R_body_mount @ forward_kinematics(boom, q).rotation
     across = np.cross(rig.view, [0.0, 1.0, 0.0]) if abs(rig.view[1]) < 0.9 else np.cross(rig.view, [1.0, 0.0, 0.0])
     across = across / np.linalg.norm(across)
@@ -160,7 +160,7 @@ def _corners(rig: Rig, q: Array, boom: Boom, R: Array, to_enu: Array, sensor: Ge
 
 
 def _in_plane(spot: Geotags, view: Array, height_std: float, steep: Mask) -> Geotags:
-    """Return the spot with its covariance moved along the view into the level plane; NaN where the view meets none."""
+    """Return the spot, its covariance moved along the view into the plane; NaN without a spot."""
     down = np.minimum(view[:, 2], -_STEEPEST)
     along = view / down[:, None]
     flat = np.eye(3) - along[:, :, None] * np.array([0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""Tables of a field's logs: CSV with a header, every value traced to its line, and times on a named clock."""
+"""Tables of a field's logs: CSV with a header, values traced to lines, times on a named clock."""
 
 import csv
 from collections.abc import Iterable, Sequence
@@ -176,7 +176,7 @@ def shown(cell: str) -> str:
 
 
 def _near(name: str, meant: str) -> bool:
-    """Whether a name is a slip of another: heading or Heading_deg for heading_deg, not std_up_m for std_east_m."""
+    """Whether a name is a slip of another: heading for heading_deg, not std_up_m for std_east_m."""
     from difflib import SequenceMatcher
 
     return SequenceMatcher(None, name.lower(), meant).ratio() > 0.8

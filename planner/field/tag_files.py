@@ -1,4 +1,4 @@
-"""Files of geotags: a table as CSV or GeoParquet, and points with footprints as GeoJSON for QGIS."""
+"""Files of geotags: a table as CSV or GeoParquet, points with footprints as GeoJSON for QGIS."""
 
 import csv
 import json
@@ -32,12 +32,13 @@ def rows_of(tags: SensorTags, epsg: int, plots: PlotMap | None = None, located: 
     sensor, seen = _columns("sensor", tags.sensor, epsg), _columns("seen", tags.seen, epsg)
     heading = np.degrees(np.arctan2(tags.sensor.R_enu_body[:, 0, 0], tags.sensor.R_enu_body[:, 1, 0])) % 360.0
     elevation = np.degrees(np.arcsin(np.clip(tags.view[:, 2], -1.0, 1.0)))
+    bearing = np.degrees(tags.bearing)
     rows = []
     for k, label in enumerate(tags.triggers.labels):
         row: dict[str, Any] = {"label": label, "utc" if tags.triggers.clock == "utc" else "t": float(tags.triggers.t[k])}
         row |= {name: _number(values[k], name) for name, values in (*sensor.items(), *seen.items())}
         row["vehicle_heading_deg"] = _number(heading[k], "_m")
-        row["view_bearing_deg"] = _number(np.degrees(tags.bearing[k]), "_m")
+        row["view_bearing_deg"] = _number(bearing[k], "_m")
         row["view_elevation_deg"] = _number(elevation[k], "_m")
         row["sag_m"] = _number(-tags.sag[k, 2], "_m")
         if plots is not None and located is not None:
@@ -61,7 +62,7 @@ def write_table(path: str | Path, tags: SensorTags, rows: list[dict[str, Any]]) 
 
 
 def _write_geoparquet(path: str | Path, tags: SensorTags, rows: list[dict[str, Any]]) -> None:
-    """Write GeoParquet 1.1: the sensor's position as `geometry` with its height, what it saw as `footprint`.
+    """Write GeoParquet 1.1: the sensor's position as `geometry`, what it saw as `footprint`.
 
     Source: https://geoparquet.org/releases/v1.1.0/
     """
@@ -69,9 +70,8 @@ def _write_geoparquet(path: str | Path, tags: SensorTags, rows: list[dict[str, A
     import pyarrow.parquet as pq
 
     shapely, pyproj = library("shapely"), library("pyproj")
-    points = [shapely.Point(_point(row)) if tags.known[k] else None for k, row in enumerate(rows)]
-    rings = [_ring(tags, k) for k in range(len(rows))]
-    footprints = [None if ring is None else shapely.Polygon(ring) for ring in rings]
+    points = [shapely.Point(_point(row)) if known else None for known, row in zip(tags.known, rows, strict=True)]
+    footprints = [None if ring is None else shapely.Polygon(ring) for ring in _rings(tags)]
     columns = {name: pa.array([row[name] for row in rows], pa.string() if name in _TEXTS else pa.float64()) for name in rows[0]}
     about = {}
     for name, shapes, kind, crs in (
@@ -100,12 +100,11 @@ def write_geojson(path: str | Path, tags: SensorTags, rows: list[dict[str, Any]]
 
 
 def _features(tags: SensorTags, rows: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    for k, row in enumerate(rows):
-        if not tags.known[k]:
+    for known, row, ring in zip(tags.known, rows, _rings(tags), strict=True):
+        if not known:
             continue
         geometry: dict[str, Any] = {"type": "Point", "coordinates": _point(row)}
         yield {"type": "Feature", "properties": {"of": "sensor", **row}, "geometry": geometry}
-        ring = _ring(tags, k)
         if ring is not None:
             what = {name: row[name] for name in ("label", "plot", "probability") if name in row}
             geometry = {"type": "Polygon", "coordinates": [ring]}
@@ -116,15 +115,20 @@ def _point(row: dict[str, Any]) -> list[float]:
     return [row["sensor_longitude_deg"], row["sensor_latitude_deg"], row["sensor_height_m"]]
 
 
-def _ring(tags: SensorTags, k: int) -> list[list[float]] | None:
-    """Return longitude, latitude [deg] of a footprint, anticlockwise and closed; None where there is none."""
-    if not np.isfinite(tags.footprint[k]).all():
-        return None
-    latitude, longitude, _ = geodetic_of(tags.footprint[k])
-    ring = [[round(x, _DEGREES), round(y, _DEGREES)] for x, y in np.degrees(np.column_stack([longitude, latitude])).tolist()]
-    area = sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
-    ring = ring if area > 0.0 else ring[::-1]
-    return [*ring, ring[0]]
+def _rings(tags: SensorTags) -> list[list[list[float]] | None]:
+    """Return longitude, latitude [deg] of footprints, anticlockwise and closed; None for none."""
+    known = np.asarray(np.isfinite(tags.footprint).all(axis=(1, 2)))
+    found: list[list[list[float]] | None] = [None] * len(known)
+    if not known.any():
+        return found
+    latitude, longitude, _ = geodetic_of(tags.footprint[known])
+    rings = np.degrees(np.stack([longitude, latitude], axis=-1)).round(_DEGREES)
+    x, y = np.moveaxis(rings - rings[:, :1], -1, 0)
+    clockwise = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) < 0.0
+    rings[clockwise] = rings[clockwise, ::-1]
+    for k, ring in zip(np.flatnonzero(known).tolist(), np.concatenate([rings, rings[:, :1]], axis=1).tolist(), strict=True):
+        found[k] = ring
+    return found
 
 
 def _columns(of: str, tags: Geotags, epsg: int) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Pictures of geotags: plots, the vehicle's track, where the sensor was, and what it saw with its 95 % ellipse."""
+"""Pictures of geotags: plots, track, where the sensor was, what it saw with its 95 % ellipse."""
 
 from typing import Any
 
@@ -94,7 +94,7 @@ def _known(tags: Geotags) -> Mask:
 
 
 def _least_sure(tags: SensorTags, located: Located | None) -> int:
-    """Index of the spot whose likeliest plot, or none, has the least probability; or of the largest ellipse."""
+    """Index of the spot whose plot is least sure; without a map, of the largest ellipse."""
     if located is not None and (located.plot >= 0).any():
         surest = np.maximum(located.probability, np.nan_to_num(located.outside))
         return int(np.argmin(np.where(located.plot >= 0, surest, np.inf)))

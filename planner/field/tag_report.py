@@ -15,7 +15,7 @@ _RIG = ("part", "basis", "source")
 
 
 def sentences(tags: SensorTags, plots: PlotMap | None = None, located: Located | None = None) -> list[str]:
-    """Return how many triggers were tagged, what the sag is, and on how many plots what they saw lies."""
+    """Return how many triggers were tagged, what the sag is, and on how many plots they lie."""
     known = tags.known
     said = [
         f"{tags.triggers.source}: {len(known)} triggers, {known.sum()} tagged",
@@ -31,7 +31,7 @@ def sentences(tags: SensorTags, plots: PlotMap | None = None, located: Located |
 
 
 def accuracy_rows(tags: SensorTags) -> list[tuple[str, ...]]:
-    """Return the standard deviations and 95 % ellipses of the sensor and of what it saw, under ACCURACY."""
+    """Return deviations and 95 % ellipses of the sensor and of what it saw, under ACCURACY."""
     rows = []
     for name, each in (("sensor", tags.sensor), ("what it saw", tags.seen)):
         at = np.isfinite(each.ecef).all(axis=-1)

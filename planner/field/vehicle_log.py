@@ -164,7 +164,7 @@ class VehicleLog:
 
     @cached_property
     def enu_velocity(self) -> Array:
-        """(n, 3) velocity of the antenna, east, north, up [m/s]; by differences where the log has none."""
+        """(n, 3) velocity of the antenna, east, north, up [m/s]; by differences without one."""
         velocity = np.gradient(self.ecef, self.t, axis=0) if self.velocity is None else self.velocity
         turned: Array = np.einsum("nji,nj->ni", self.R_ecef_enu, velocity)
         return turned
@@ -176,7 +176,7 @@ class VehicleLog:
 
     @cached_property
     def jumps(self) -> Array:
-        """(n - 1,) how far [m] the step after a fix is from what the velocities around it say; 0 where that is noise.
+        """(n - 1,) how far [m] the step after a fix is from the velocities around it; 0 for noise.
 
         It is noise below 8 standard deviations plus 15 m/s^2 over the interval.
         """
@@ -190,7 +190,7 @@ class VehicleLog:
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """Gaps, jumps, falls of the fix's quality and doubts, one sentence each, naming the line."""
+        """Gaps, jumps, falls of the fix's quality and doubts, each naming the line."""
         said = [f"{self.source}: {listed('without a fix left out', self.lost)}"] if self.lost else []
         for kind, where in (("gap", self.gaps), ("jump", self.jumps > 0.0)):
             for k in map(int, np.flatnonzero(where)):
@@ -234,7 +234,7 @@ def _heading_doubt(log: VehicleLog) -> tuple[str, ...]:
 
 
 def listed(what: str, lines: Sequence[int]) -> str:
-    """Return how many lines are left out and which, the first few of them: "2 lines without a fix left out: 5, 9"."""
+    """Return how many lines there are and the first: "2 lines without a fix left out: 5, 9"."""
     first = ", ".join(map(str, lines[:_LISTED])) + (", ..." if len(lines) > _LISTED else "")
     return f"{len(lines)} line{'s' if len(lines) > 1 else ''} {what}: {first}"
 

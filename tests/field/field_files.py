@@ -113,7 +113,8 @@ def write_field(
 
 
 def write_points(place: Path, drive: Drive, t: Array, r: Array, *, utc: float = 1.7830e9, seed: int = 0) -> None:
-    """Write a total station's positions of a point at r (3,) or (n, 3) of the vehicle, each to 3 mm."""
+    """Write a total station's positions of a point at r (3,) or (n, 3) of the vehicle, each to 3
+    mm."""
     noisy = drive.frame.enu(drive.point(t, r)) + np.random.default_rng(seed).normal(0.0, 0.003, (len(t), 3))
     latitude, longitude, height = geodetic_of(drive.frame.ecef(noisy))
     rows = zip(utc + t, np.degrees(latitude), np.degrees(longitude), height, strict=True)

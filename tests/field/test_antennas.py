@@ -1,4 +1,5 @@
-"""A log from several antennas: exact motions, the covariance of its attitude against samples, and geotags of further points."""
+"""A log from several antennas: exact motions, the covariance of its attitude against samples, and
+geotags of further points."""
 
 import numpy as np
 import pytest
@@ -26,7 +27,8 @@ def test_three_antennas_give_position_and_attitude():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_covariance_of_a_point_equals_samples(seed):
-    """Antennas at random places, each coordinate wrong by 10 mm in 40,000 samples; Wahba's problem solved by another way."""
+    """Antennas at random places, each coordinate wrong by 10 mm in 40,000 samples; Wahba's problem
+    solved by another way."""
     random, count, std = np.random.default_rng(seed), 40_000, 0.01
     places = {str(k): random.uniform(-1.5, 1.5, 3) for k in range(4)}
     point, t = random.uniform(-2.0, 2.0, 3), np.array([0.0, 1.0])

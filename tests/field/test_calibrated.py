@@ -1,4 +1,5 @@
-"""The probability of the plot through the whole chain: of spots said to be on a plot with p, a share p is there."""
+"""The probability of the plot through the whole chain: of spots said to be on a plot with p, a
+share p is there."""
 
 from dataclasses import replace
 

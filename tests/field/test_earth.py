@@ -25,7 +25,8 @@ TOPOCENTRIC = np.array([-189013.869, -128642.040, -4220.171])  # U, V, W, as pri
 
 
 def test_epsg_9836_example():
-    """IOGP Guidance Note 7-2, geocentric to topocentric; printed to a millimetre, the origin to a tenth of one."""
+    """IOGP Guidance Note 7-2, geocentric to topocentric; printed to a millimetre, the origin to a
+    tenth of one."""
     frame = earth.LocalFrame.at(np.radians(55.0), np.radians(5.0), 200.0)
     assert frame.origin == pytest.approx([3652755.3058, 319574.6799, 5201547.3536], abs=6e-5)
     ecef = np.array([3771793.968, 140253.342, 5124304.349])
@@ -34,7 +35,8 @@ def test_epsg_9836_example():
 
 
 def test_epsg_9837_example():
-    """The same note, geographic to topocentric: 53 deg 48' 33.820" N, 2 deg 7' 46.380" E, 73.0 m."""
+    """The same note, geographic to topocentric: 53 deg 48' 33.820" N, 2 deg 7' 46.380" E, 73.0
+    m."""
     frame = earth.LocalFrame.at(np.radians(55.0), np.radians(5.0), 200.0)
     latitude, longitude = np.radians(53 + 48 / 60 + 33.82 / 3600), np.radians(2 + 7 / 60 + 46.38 / 3600)
     assert frame.enu(earth.ecef_of(latitude, longitude, 73.0)) == pytest.approx(TOPOCENTRIC, abs=1e-3)

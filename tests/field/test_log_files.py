@@ -9,7 +9,9 @@ import pytest
 
 from boom_model import InputError
 from planner.field.earth import coordinates_in
+from planner.field.geotag import geotag
 from planner.field.log_files import read_joint_log, read_triggers, read_vehicle_log
+from planner.field.vehicle_log import VehicleLog
 from tests.field.field_files import ANTENNA, write_field
 from tests.field.motions import Drive
 
@@ -229,6 +231,9 @@ def test_a_thousand_mutated_logs_are_read_or_refused_in_a_line(tmp_path):
             messages.append(str(error))
         else:
             assert np.isfinite(log.t).all()
+            if isinstance(log, VehicleLog):
+                tags = geotag(log, {"sensor": [0.2, 2.5, -2.0]}, log.t[:20] + 0.01)["sensor"]
+                assert np.isfinite(tags.covariance[tags.known]).all()
     assert len(messages) > 300
     assert not [text for text in messages if "\n" in text or len(text) > 500]
     assert not [text for text in messages if not re.search(r"line \d|row|column|fix|no |not |it has", text)]

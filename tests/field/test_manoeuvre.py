@@ -1,4 +1,5 @@
-"""A rig measured from a manoeuvre, through the command and from Python: what was injected is found, and geotag reads it."""
+"""A rig measured from a manoeuvre, through the command and from Python: what was injected is found,
+and geotag reads it."""
 
 import json
 import tomllib
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from boom_model import Boom, forward_kinematics
+from boom_model import BaseMotion, Boom, forward_kinematics, inverse_dynamics, tip_deflection
 from planner.field import attitude
 from planner.field.log_files import JointLog, Points, read_vehicle_log
 from planner.field.manoeuvre import measure_rig
@@ -64,7 +65,8 @@ def test_answers_fit_every_width(manoeuvre, monkeypatch):
 
 
 def test_geotag_reads_the_measured_rig(manoeuvre, tmp_path):
-    """The same triggers, tagged with the rig as given and as measured, against where the sensor was."""
+    """The same triggers, tagged with the rig as given and as measured, against where the sensor
+    was."""
     manoeuvre(*ASK, "--out", "measured.toml")
     off = {}
     for name in ("rig.toml", "measured.toml"):
@@ -105,7 +107,8 @@ def test_json_holds_the_covariance(manoeuvre):
 
 
 def test_antenna_from_a_point_at_a_known_place(manoeuvre, tmp_path):
-    """A prism on the roof: the antenna's place is found from it, and the points' clock may be the one that is late."""
+    """A prism on the roof: the antenna's place is found from it, and the points' clock may be the
+    one that is late."""
     prism = np.array([-0.8, 0.4, 2.2])
     write_points(tmp_path / "points.csv", DRIVE, STAMPS, prism)
     text = (tmp_path / "rig.toml").read_text()
@@ -122,7 +125,8 @@ def test_antenna_from_a_point_at_a_known_place(manoeuvre, tmp_path):
 
 
 def test_angles_lever_arm_and_both_latencies_from_a_sweep(tmp_path):
-    """The boom sweeps while the vehicle turns; mount, its angles and the joints' clock are all wrong in the rig."""
+    """The boom sweeps while the vehicle turns; mount, its angles and the joints' clock are all
+    wrong in the rig."""
     boom = without_drives(Boom.load())
     names = write_field(tmp_path, DRIVE, 60.0, seed=5, late=0.1)
     rig, log = read_rig(names["rig"]), read_vehicle_log(names["vehicle"])
@@ -153,6 +157,36 @@ def test_angles_lever_arm_and_both_latencies_from_a_sweep(tmp_path):
     assert new == pytest.approx(
         Rotation.from_rotvec([f.found for f in found.figures[-3:]]).as_matrix() @ rig.R_body_mount, abs=1e-6
     )
+
+
+def test_sweep_of_the_shipped_boom_through_the_command(manoeuvre, tmp_path):
+    """The boom sags as `tip_deflection` says; with that in the points, mount and angles are found
+    from the sensor."""
+    boom, q = Boom.load(), _swept(STAMPS)
+    lines = [f"{1.7830e9 + t + 0.01:.3f},{','.join(f'{x:.8f}' for x in row)}" for t, row in _samples()]
+    (tmp_path / "joints.csv").write_text("\n".join(["utc,q1,q2,q3,q4,q5", *lines]) + "\n")
+    tip = forward_kinematics(boom, q)
+    up = np.swapaxes(attitude.rotation(*DRIVE.angles(STAMPS).T), -1, -2)[..., 2]
+    R = Rotation.from_rotvec([0.0, 0.0, np.radians(2.0)]).as_matrix()
+    tau = inverse_dynamics(boom, q, np.zeros(5), np.zeros(5), base=BaseMotion.of(up=up @ R)).tau
+    sag = tip_deflection(boom, q, tau).wind_up
+    assert np.linalg.norm(sag, axis=-1).max() > 2e-3
+    write_points(tmp_path / "points.csv", DRIVE, STAMPS, MOUNT + (tip.position + sag + tip.rotation @ SENSOR) @ R.T)
+    code, _, error = manoeuvre(
+        *ASK, "--joints", "joints.csv", "--estimate", "delay,joints-delay,lever-arm,angles", "--out", "m.toml"
+    )
+    assert (code, error) == (0, "")
+    rig = read_rig(tmp_path / "m.toml")
+    assert np.abs(rig.mount - MOUNT).max() < 3.0 * rig.mount_std < 0.01
+    assert rig.latencies.position == pytest.approx(0.1, abs=5e-3)
+    assert rig.latencies.joints == pytest.approx(0.01, abs=5e-3)
+    off = Rotation.from_matrix(rig.R_body_mount @ R.T).as_rotvec()
+    assert np.abs(off).max() < 3.0 * rig.mount_turn_std < np.radians(0.3)
+
+
+def _samples():
+    t = np.arange(0.0, 60.0, 0.01)
+    return zip(t, _swept(t), strict=True)
 
 
 def _swept(t):

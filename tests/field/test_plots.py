@@ -57,7 +57,8 @@ def test_files_there_and_back(form, tmp_path):
 
 
 def test_geopackage_as_qgis_writes_it(tmp_path):
-    """Multipolygons in UTM with heights, numbers with a blank as names, beside a table and a layer of points."""
+    """Multipolygons in UTM with heights, numbers with a blank as names, beside a table and a layer
+    of points."""
     plots, _ = trial()
     place = tmp_path / "field.gpkg"
     rings = [coordinates_in(32613, ecef_of(*plot[0].T, 480.0)) for plot in plots.rings[:3]]

@@ -143,7 +143,8 @@ def _antenna(log, t):
 
 
 def test_simulated_field_errs_as_predicted(tmp_path):
-    """A minute at 1.4 m/s with 20 Hz RTK and 100 Hz joints as files; tagged at the fixes, the RMS is what the tags say."""
+    """A minute at 1.4 m/s with 20 Hz RTK and 100 Hz joints as files; tagged at the fixes, the RMS
+    is what the tags say."""
     boom, drive = without_drives(Boom.load()), Drive()
     names = write_field(tmp_path, drive, 60.0, seed=21)
     quiet = replace(
@@ -167,7 +168,8 @@ def test_simulated_field_errs_as_predicted(tmp_path):
 
 @pytest.mark.parametrize("seed", range(10))
 def test_whole_chains_covariance_equals_monte_carlo(seed, day):
-    """A random rig, pose and motion: every error of logs, rig and clocks drawn 100,000 times, the chain written out again."""
+    """A random rig, pose and motion: every error of logs, rig and clocks drawn 100,000 times, the
+    chain written out again."""
     boom, random, count = without_drives(Boom.load()), np.random.default_rng(300 + seed), 100_000
     late = Latencies(position_std=0.008, attitude_std=0.02, joints_std=0.01, trigger_std=0.005)
     imu, mounting = (attitude.rotation(0.0, 0.0, 0.0).T @ attitude.rotation(*random.uniform(-0.3, 0.3, 3)) for _ in range(2))
