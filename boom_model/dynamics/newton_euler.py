@@ -20,7 +20,6 @@ All this holds for a parallelogram. Where the links are unequal, `virtual_work` 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import tan
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -33,6 +32,7 @@ from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.dynamics.virtual_work import balance
 from boom_model.errors import InputError
 from boom_model.kinematics.frames import R_LINK_BODY
+from boom_model.trigonometry import cosine_and_sine
 
 PayloadAs = Literal["mass", "force"]
 
@@ -128,9 +128,9 @@ def inverse_dynamics(
     twist = None if tip_moment is None else matched("tip_moment", tip_moment, shape)
     count = len(motion[0])
     out = _Outputs(
-        np.empty((count, 5)),
-        np.zeros((3, count, 3)) if reactions else None,
-        np.empty((count, 6)) if reactions else None,
+        np.empty((5, count)).T,
+        np.zeros((3, 3, count)).swapaxes(1, 2) if reactions else None,
+        np.empty((6, count)).T if reactions else None,
     )
     model = regrouped(boom, payload_as) if boom.geometry.is_parallelogram else None
     rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) if drive_inertia else None
@@ -162,6 +162,33 @@ def inverse_dynamics(
     return Loads(out.tau.reshape(positions.shape), pins, mount)
 
 
+def weight_torque(boom: Boom, q: Array, up: Array | None = None) -> Array:
+    """Return the torque (n, 5) that carries bodies and payload at rest at q (n, 5); of a parallelogram alone.
+
+    Without motion, A is minus gravity for the origin o and 0 for every other vector b.
+
+    Args:
+        boom: the boom.
+        q: (n, 5) joint positions.
+        up: (n, 3) unit vector against gravity, along frame 1; None on level ground.
+    """
+    state = _State(*[list(np.ascontiguousarray(q.T))] * 3)
+    x, z, across = (0.0, boom.gravity, 0.0) if up is None else (boom.gravity * a for a in _into_plane(state, list(up.T)))
+    Q = regrouped(boom, "mass").torque_rows[:, _O].tolist()
+    _, q2, q3, q4, q5 = state.q
+    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q2), cosine_and_sine(q3), cosine_and_sine(q3 + q5)
+    slid = Q[_RHO] * (boom.geometry.L7 + q4)
+    tau = np.zeros((5, len(q)))
+    for joint, c, s, (e, p) in ((1, c2, s2, _LINKS[0]), (2, c3, s3, _LINKS[1]), (4, ct, st, _LINKS[2])):
+        tau[joint] = c * (Q[e] * z - Q[p] * x) - s * (Q[e] * x + Q[p] * z)
+    tau[2] += slid * (c3 * z - s3 * x) + tau[4]
+    tau[3] = Q[_RHO] * (c3 * x + s3 * z)
+    if up is not None:
+        turned = sum(c * Q[e] - s * Q[p] for c, s, (e, p) in zip((c2, c3, ct), (s2, s3, st), _LINKS, strict=True))
+        tau[0] = Q[_N] * x - across * (Q[_X] + turned + slid * c3)
+    return tau.T
+
+
 def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
     """Force (..., 3) [N] that the inner link carries at its upper pin, in frame 5 of the inner loop: x along the link.
 
@@ -188,7 +215,7 @@ def base_series(base: BaseMotion | None, shape: tuple[int, ...]) -> list[Array]:
 def element_accelerations(boom: Boom, q: Array, qd: Array, qdd: Array, *base: Array) -> Array:
     """Return A (3, 11, n) of n states (n, 5) along x, z and n, on a base moved as `base_series` says."""
     state = _State(*(list(np.ascontiguousarray(x.T)) for x in (q, qd, qdd)))
-    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
+    (c2, s2), (c3, s3), (ct, st) = (cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
     plane = _plane(boom, state, *(list(x.T) for x in base))
     return np.asarray(_accelerations(state, plane, (c2, c3, ct), (s2, s3, st), boom.geometry.L7 + q[:, 3]))
 
@@ -199,7 +226,7 @@ def element_velocities(boom: Boom, q: Array) -> Array:
     Yaw turns the plane about z: x goes to -n, n to x. An angle turns its links' e to p, and p to
     -e.
     """
-    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
+    (c2, s2), (c3, s3), (ct, st) = (cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
     rho = boom.geometry.L7 + q[:, 3]
     moved = np.zeros((5, 3, 11, len(q)))
     moved[0, 0, _N] = 1.0
@@ -325,9 +352,13 @@ class _Plane(NamedTuple):
     """a0 minus gravity"""
     W: _Vector
     W1: _Vector
+    level: bool
+    """Whether the base is at rest on level ground."""
 
 
 class _Outputs(NamedTuple):
+    """Results of a chunk. In memory, each component of all states is one run of numbers."""
+
     tau: Array
     pins: Array | None
     """(3, n, 3)"""
@@ -373,7 +404,7 @@ def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 def _into_plane(state: _State, vector: Sequence[_Value]) -> _Vector:
     """Return the components of a vector, given along frame 1, along x, z and n of the plane."""
-    c, s = _cosine_and_sine(state.q[0])
+    c, s = cosine_and_sine(state.q[0])
     return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
 
 
@@ -381,7 +412,7 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     rate, accel = state.qd[0], state.qdd[0]
     if not base:
         level = (0.0, boom.gravity, 0.0)
-        return _Plane(level, level, (0.0, rate, 0.0), (0.0, accel, 0.0))
+        return _Plane(level, level, (0.0, rate, 0.0), (0.0, accel, 0.0), True)
     angular_velocity, angular_acceleration, acceleration, up = (_into_plane(state, x) for x in base)
     w1, w2, w3 = angular_velocity
     d1, d2, d3 = angular_acceleration
@@ -389,7 +420,7 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     a = (acceleration[0] + lift[0], acceleration[1] + lift[1], acceleration[2] + lift[2])
     # The yaw axis is the plane's z: W' = base's + theta1'' z + W_base x theta1' z (thesis, eq.
     # 2.40).
-    return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1))
+    return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1), False)
 
 
 def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> _Rows:
@@ -400,6 +431,45 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
     C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
     """
     A: Any = [[0.0] * 11, [0.0] * 11, [0.0] * 11] if isinstance(rho, float) else np.empty((3, 11, *rho.shape))
+    Ax, Az, An = A
+    if plane.level:
+        _fill_level(A, state, plane, C, S)
+    else:
+        _fill_moving(A, state, plane, C, S)
+    c, s, slide = C[1], S[1], 2.0 * state.qd[3]
+    turning = slide * (state.qd[2] + plane.W[2])
+    Ax[_RHO] = rho * Ax[_E3] + (state.qdd[3] * c - turning * s)
+    Az[_RHO] = rho * Az[_E3] + (state.qdd[3] * s + turning * c)
+    across = plane.W[1] * c if plane.level else plane.W[1] * c - plane.W[0] * s
+    An[_RHO] = rho * An[_E3] - slide * across
+    rows: _Rows = A
+    return rows
+
+
+def _fill_level(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value]) -> None:
+    """Fill A but for rho e3, as `_fill_moving`, for a base at rest: the plane turns about z alone."""
+    Ax, Az, An = A
+    w, d = plane.W[1], plane.W1[1]
+    square = w * w
+    Ax[_O], Az[_O], An[_O] = plane.a
+    Ax[_X], Az[_X], An[_X] = -square, 0.0, -d
+    Ax[_Z], Az[_Z], An[_Z] = 0.0, 0.0, 0.0
+    Ax[_N], Az[_N], An[_N] = d, 0.0, -square
+    qd, qdd = state.qd, state.qdd
+    rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
+    for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
+        along_z = rate * rate
+        along_x, m = along_z + square, 2.0 * rate * w
+        Ax[e] = -along_x * c - accel * s
+        Az[e] = accel * c - along_z * s
+        An[e] = m * s - d * c
+        Ax[p] = along_x * s - accel * c
+        Az[p] = -accel * s - along_z * c
+        An[p] = m * c + d * s
+
+
+def _fill_moving(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value]) -> None:
+    """Fill A but for rho e3."""
     Ax, Az, An = A
     w1, w2, w3 = plane.W
     d1, d2, d3 = plane.W1
@@ -422,13 +492,6 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
         Ax[p] = along_x * s - less * c
         Az[p] = -more * s - along_z * c
         An[p] = m * c - k * s
-    c, s, slide = C[1], S[1], 2.0 * qd[3]
-    turning = slide * (qd[2] + w3)
-    Ax[_RHO] = rho * Ax[_E3] + (qdd[3] * c - turning * s)
-    Az[_RHO] = rho * Az[_E3] + (qdd[3] * s + turning * c)
-    An[_RHO] = rho * An[_E3] + slide * (w1 * s - w2 * c)
-    rows: _Rows = A
-    return rows
 
 
 def _newton_euler(
@@ -437,7 +500,7 @@ def _newton_euler(
     """Fill the outputs of a chunk, with a force and a moment on the tip."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
-    (c2, s2), (c3, s3), (ct, st) = _cosine_and_sine(q[1]), _cosine_and_sine(q[2]), _cosine_and_sine(q[2] + q[4])
+    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q[1]), cosine_and_sine(q[2]), cosine_and_sine(q[2] + q[4])
     A = _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), rho)
     rows = model.rows if out.pins is not None else model.torque_rows
     U = np.array(A[0] + A[1] + A[2]).reshape(3, 11).dot(rows.T) if isinstance(A, list) else rows @ A
@@ -467,7 +530,8 @@ def _newton_euler(
     if isinstance(A, list):
         out.tau[0] = tau
     else:
-        np.stack(tau, axis=-1, out=out.tau)
+        for row, part in zip(out.tau.T, tau, strict=True):
+            row[:] = part
     if out.pins is None or out.mount is None:
         return
 
@@ -486,20 +550,13 @@ def _newton_euler(
     rise = (s2 * Un[_E2] + c2 * Un[_P2]) + (s3 * Un[_E3] + c3 * Un[_P3]) + rho * s3 * Un[_RHO] + (st * Un[_ET] + ct * Un[_PT])
     Mx = Un[_Z] - Uz[_N] + rise - mx
     Mn = Uz[_X] - Ux[_Z] + tau_2 + tau_3
-    c1, s1 = _cosine_and_sine(q[0])
+    c1, s1 = cosine_and_sine(q[0])
     mount = out.mount
     for row, along, normal in ((0, Ux[_O], Un[_O]), (3, Mx, Mn)):
         mount[:, row] = -(c1 * along + s1 * normal)
         mount[:, row + 1] = -(s1 * along - c1 * normal)
     mount[:, 2] = -Uz[_O]
     mount[:, 5] = -tau_1
-
-
-def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
-    """By the tangent of half the angle, to 3e-16: NumPy's tangent is vectorised for doubles, its cosine and sine are not."""
-    t = tan(0.5 * angle) if isinstance(angle, float) else np.tan(0.5 * angle)
-    u = 2.0 / (1.0 + t * t)
-    return u - 1.0, u * t
 
 
 def _put_on(U: Array, g: Array, force: _Vector) -> None:

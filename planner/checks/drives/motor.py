@@ -1,6 +1,7 @@
 """Checks of a hybrid stepper motor and its gearbox against the motor's datasheet."""
 
 from collections.abc import Iterator
+from functools import reduce
 
 import numpy as np
 
@@ -61,12 +62,12 @@ def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
         yield _motor_torque_row(view, drive, kind, demands[-1])
     yield _quasi_static_row(view, drive)
     if other:
-        yield _other_reading_row(view, drive, np.max(other, axis=0))
-    yield _motor_speed_row(view, drive, np.max(demands, axis=0))
+        yield _other_reading_row(view, drive, reduce(np.maximum, other))
+    yield _motor_speed_row(view, drive, reduce(np.maximum, demands))
     braked = drive.brake is not None and drive.brake.value  # a motor without a brake stays on in a pause
     driven = np.where(view.duty.powered, demands[0], 0.0) if braked else demands[0]
     known = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; a stepper's heat depends on its current, not on its torque")
-    yield view.informative(CheckKind.MOTOR_RMS_TORQUE, figure=view.duty.mean(driven**2) ** 0.5, origin=known)
+    yield view.informative(CheckKind.MOTOR_RMS_TORQUE, figure=view.duty.mean(driven * driven) ** 0.5, origin=known)
 
 
 def _unknown_torque_rows(view: JointView, drive: Drive, directions: list[CheckKind]) -> Iterator[Row]:
