@@ -254,7 +254,9 @@ class Friction:
     def dry(self, direction: ArrayLike) -> Array:
         """Return the part that does not grow with speed, for directions -1, 0 or 1 of motion (..., 5)."""
         direction = np.asarray(direction, dtype=float)
-        torque: Array = self.coulomb * direction + self.asymmetric * np.abs(direction) if self.any else np.zeros(direction.shape)
+        torque: Array = np.zeros(direction.shape)
+        if self.any:
+            torque = self.coulomb * direction + self.asymmetric * np.abs(direction)
         return torque
 
 
