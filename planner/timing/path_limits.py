@@ -171,7 +171,7 @@ def demand_ratios(boom: Boom, path: Path, law: TimeLaw, t: Array, base: BaseMoti
 
 def _along(path: Path, law: TimeLaw, t: Array) -> tuple[Array, Array, Array, Array]:
     """Return q, p', qd and qdd of a law at times t (n,), each (n, 5), a joint after the other in memory."""
-    s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
+    s, v, u = law.s.derivatives(t, 2)
     s = np.clip(s, 0.0, 1.0)
     q, p1, p2 = (path(s, order).T for order in range(3))
     return q.T, p1.T, (p1 * v).T, (p1 * u + p2 * v**2).T
@@ -222,7 +222,7 @@ class PathLoads:
 
     def stretch(self, law: TimeLaw, t: Array, floor: float) -> float:
         """Return the smallest factor >= `floor` with which a law respects the limits at t (n,)."""
-        s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
+        s, v, u = law.s.derivatives(t, 2)
         s, v, u = np.clip(s, 0.0, 1.0), v[:, None], u[:, None]
         p1 = self.path(s, 1)
         qd, qdd = p1 * v, p1 * u + self.path(s, 2) * v**2
