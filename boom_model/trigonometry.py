@@ -7,7 +7,7 @@ import numpy as np
 
 from boom_model.arrays import Array
 
-Angle = TypeVar("Angle", Array, float)
+Angle = TypeVar("Angle", Array, float, Array | float)
 
 
 def cosine_and_sine(angle: Angle) -> tuple[Angle, Angle]:

@@ -25,7 +25,6 @@ import numpy as np
 from boom_model.arrays import Array, read_only
 from boom_model.boom import Boom
 from boom_model.dynamics.newton_euler import regrouped
-from boom_model.trigonometry import cosine_and_sine
 
 _COSINES, _SINES, _RHO_3, _AT_3 = slice(1, 4), slice(4, 7), slice(7, 9), slice(2, 6, 3)  # entries of f
 _ANGLES = read_only([[0, 0, 0], [1, 0, 0], [0, 1, 1], [0, 0, 0], [0, 0, 1]])
@@ -104,7 +103,8 @@ def _features(boom: Boom, q: Array) -> Array:
     f = np.empty((len(q), 9))
     angles = q @ _ANGLES
     f[:, 0] = 1.0
-    f[:, _COSINES], f[:, _SINES] = cosine_and_sine(angles)
+    np.cos(angles, out=f[:, _COSINES])
+    np.sin(angles, out=f[:, _SINES])
     np.multiply(f[:, _AT_3], (boom.geometry.L7 + q[:, 3])[:, None], out=f[:, _RHO_3])
     return f
 
@@ -115,7 +115,10 @@ def _evaluate(forms: Array, f: Array) -> Array:
     products = f.take(_PRODUCTS[0], axis=1) * f.take(_PRODUCTS[1], axis=1)
     if count == 1:  # BLAS rounds a vector's product differently; a state must not depend on its batch
         return (np.concatenate([products, products]) @ forms)[:1].reshape(1, 5, coefficients)
-    values, parts = np.empty((count, forms.shape[1])), -(-count * forms.size // _ONE_THREAD)
+    parts = -(-count * forms.size // _ONE_THREAD)
+    if parts <= 1:
+        return (products @ forms).reshape(count, 5, coefficients)
+    values = np.empty((count, forms.shape[1]))
     for k in range(parts):
         part = slice(count * k // parts, count * (k + 1) // parts)
         np.matmul(products[part], forms, out=values[part])
@@ -129,7 +132,7 @@ def _times(G: Array, causes: Array) -> Array:
 
 def _into_plane(q: Array, vectors: Array) -> Array:
     """Return vectors (n, 3), given along frame 1, along x, z and n of the plane."""
-    c, s = cosine_and_sine(q[:, 0])
+    c, s = np.cos(q[:, 0]), np.sin(q[:, 0])
     x, y = vectors[:, 0], vectors[:, 1]
     return np.column_stack([c * x + s * y, vectors[:, 2], s * x - c * y])
 

@@ -20,6 +20,7 @@ All this holds for a parallelogram. Where the links are unequal, `virtual_work` 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isfinite
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -42,6 +43,8 @@ its products on one thread: a second one gains nothing on so thin a matrix, and 
 on a busy machine."""
 
 _O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
+_ONE = (5,)
+_NOTHING = (0.0, 0.0, 0.0)
 BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
 _LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
 
@@ -120,6 +123,11 @@ def inverse_dynamics(
     """
     if payload_as not in ("mass", "force"):
         raise InputError(f"payload_as is {payload_as!r}; it must be 'mass' or 'force'")
+    plain = base is None and tip_force is None and tip_moment is None and payload_as == "mass"
+    if plain and not (reactions or friction or drive_inertia):
+        tau = _single(boom, q, qd, qdd)
+        if tau is not None:
+            return Loads(tau, None, None)
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [x.reshape(-1, 5) for x in (positions, rates, accelerations)]
@@ -494,6 +502,50 @@ def _fill_moving(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: S
         An[p] = m * c - k * s
 
 
+def _torques(
+    rho: _Value, C: Sequence[_Value], S: Sequence[_Value], U: Any, moment: _Vector
+) -> tuple[tuple[_Value, ...], _Value]:
+    """Return the joint torques, and the moment of all beyond the actuator about its axis, from U along x, z and n."""
+    Ux, Uz, Un = U
+    (c2, c3, ct), (s2, s3, st) = C, S
+    on_tool = _about(ct, st, Ux, Uz, _ET, _PT) - moment[2]
+    beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
+    # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
+    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
+    tau_1 = Ux[_N] - Un[_X] - reach - moment[1]
+    tau_2 = _about(c2, s2, Ux, Uz, _E2, _P2)
+    tau_3 = _about(c3, s3, Ux, Uz, _E3, _P3) + beyond_actuator
+    tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
+    return (tau_1, tau_2, tau_3, tau_4, on_tool), beyond_actuator
+
+
+def _about(c: _Value, s: _Value, Ux: Sequence[_Value], Uz: Sequence[_Value], e: int, p: int) -> _Value:
+    """Return (b_e x U_e + b_p x U_p) . n."""
+    return c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
+
+
+def _single(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array | None:
+    """Return the torques (5,) of one state on level ground, without what `inverse_dynamics` prepares for many.
+
+    None for a linkage that is no parallelogram, and for other inputs than three finite arrays (5,).
+    """
+    numbers = []
+    for x in (q, qd, qdd):
+        if type(x) is not np.ndarray or x.shape != _ONE or x.dtype != np.float64:
+            return None
+        numbers.append(x.tolist())
+    state = _State(*numbers)
+    if not (isfinite(sum(state.q) + sum(state.qd) + sum(state.qdd)) and boom.geometry.is_parallelogram):
+        return None
+    _, q2, q3, q4, q5 = state.q
+    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q2), cosine_and_sine(q3), cosine_and_sine(q3 + q5)
+    rho, C, S = boom.geometry.L7 + q4, (c2, c3, ct), (s2, s3, st)
+    x, z, n = _accelerations(state, _plane(boom, state), C, S, rho)
+    U = np.array(x + z + n).reshape(3, 11).dot(regrouped(boom, "mass").torque_rows.T).tolist()
+    tau, _ = _torques(rho, C, S, U, _NOTHING)
+    return np.array(tau)
+
+
 def _newton_euler(
     model: Regrouped, state: _State, plane: _Plane, force: _Vector | None, moment: _Vector | None, out: _Outputs
 ) -> None:
@@ -501,7 +553,8 @@ def _newton_euler(
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
     (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q[1]), cosine_and_sine(q[2]), cosine_and_sine(q[2] + q[4])
-    A = _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), rho)
+    C, S = (c2, c3, ct), (s2, s3, st)
+    A = _accelerations(state, plane, C, S, rho)
     rows = model.rows if out.pins is not None else model.torque_rows
     U = np.array(A[0] + A[1] + A[2]).reshape(3, 11).dot(rows.T) if isinstance(A, list) else rows @ A
     if model.hanging:
@@ -510,23 +563,11 @@ def _newton_euler(
         )
     if force is not None:
         _put_on(U, model.tip, force)
-    mx, mz, mn = (0.0, 0.0, 0.0) if moment is None else moment
-    Ux, Uz, Un = U.tolist() if isinstance(A, list) else U
-
-    def about(c: _Value, s: _Value, e: int, p: int) -> _Value:
-        """Return (b_e x U_e + b_p x U_p) . n."""
-        turned: _Value = c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
-        return turned
-
-    on_tool = about(ct, st, _ET, _PT) - mn
-    beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
-    # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
-    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
-    tau_1 = Ux[_N] - Un[_X] - reach - mz
-    tau_2 = about(c2, s2, _E2, _P2)
-    tau_3 = about(c3, s3, _E3, _P3) + beyond_actuator
-    tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
-    tau = (tau_1, tau_2, tau_3, tau_4, on_tool)
+    moment = _NOTHING if moment is None else moment
+    U = U.tolist() if isinstance(A, list) else U
+    Ux, Uz, Un = U
+    tau, beyond_actuator = _torques(rho, C, S, U, moment)
+    tau_1, tau_2, tau_3, *_ = tau
     if isinstance(A, list):
         out.tau[0] = tau
     else:
@@ -538,8 +579,8 @@ def _newton_euler(
     # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from
     # pin 6: the moments about pins 8 and 6 give the force at pin 7 across both directions, and the
     # balance of forces the other two.
-    M_outer = about(c2, s2, 12, 13)
-    M_top = about(c3, s3, 15, 16) + beyond_actuator
+    M_outer = _about(c2, s2, Ux, Uz, 12, 13)
+    M_top = _about(c3, s3, Ux, Uz, 15, 16) + beyond_actuator
     sine = s3 * c2 - c3 * s2
     with np.errstate(divide="ignore", invalid="ignore"):
         along_inner, along_lower = np.divide(-M_top, g.L5 * sine), np.divide(-M_outer, g.L4 * sine)
@@ -548,7 +589,7 @@ def _newton_euler(
         out.pins[pin, :, 0], out.pins[pin, :, 2] = x, z
 
     rise = (s2 * Un[_E2] + c2 * Un[_P2]) + (s3 * Un[_E3] + c3 * Un[_P3]) + rho * s3 * Un[_RHO] + (st * Un[_ET] + ct * Un[_PT])
-    Mx = Un[_Z] - Uz[_N] + rise - mx
+    Mx = Un[_Z] - Uz[_N] + rise - moment[0]
     Mn = Uz[_X] - Ux[_Z] + tau_2 + tau_3
     c1, s1 = cosine_and_sine(q[0])
     mount = out.mount
