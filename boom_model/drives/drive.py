@@ -150,7 +150,7 @@ def available_torque(drive: Drive, speed: ArrayLike) -> Array | None:
         return None
     voltage, resistive, back_emf, reactive = terms
     w = np.abs(np.asarray(speed, dtype=float))
-    needed = np.sqrt((resistive + back_emf * w) ** 2 + (reactive * w) ** 2)
+    needed = np.hypot(resistive + back_emf * w, reactive * w)
     available: Array = drive.motor.running_torque * np.minimum(1.0, voltage / needed)
     return available
 

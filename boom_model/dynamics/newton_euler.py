@@ -181,19 +181,15 @@ def weight_torque(boom: Boom, q: Array, up: Array | None = None) -> Array:
         up: (n, 3) unit vector against gravity, along frame 1; None on level ground.
     """
     state = _State(*[list(np.ascontiguousarray(q.T))] * 3)
-    x, z, across = (0.0, boom.gravity, 0.0) if up is None else (boom.gravity * a for a in _into_plane(state, list(up.T)))
+    x, z, n = (0.0, boom.gravity, 0.0) if up is None else (boom.gravity * a for a in _into_plane(state, list(up.T)))
     Q = regrouped(boom, "mass").torque_rows[:, _O].tolist()
+    U = tuple([moment * along for moment in Q] for along in (x, z, n))
     _, q2, q3, q4, q5 = state.q
     (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q2), cosine_and_sine(q3), cosine_and_sine(q3 + q5)
-    slid = Q[_RHO] * (boom.geometry.L7 + q4)
-    tau = np.zeros((5, len(q)))
-    for joint, c, s, (e, p) in ((1, c2, s2, _LINKS[0]), (2, c3, s3, _LINKS[1]), (4, ct, st, _LINKS[2])):
-        tau[joint] = c * (Q[e] * z - Q[p] * x) - s * (Q[e] * x + Q[p] * z)
-    tau[2] += slid * (c3 * z - s3 * x) + tau[4]
-    tau[3] = Q[_RHO] * (c3 * x + s3 * z)
-    if up is not None:
-        turned = sum(c * Q[e] - s * Q[p] for c, s, (e, p) in zip((c2, c3, ct), (s2, s3, st), _LINKS, strict=True))
-        tau[0] = Q[_N] * x - across * (Q[_X] + turned + slid * c3)
+    torques, _ = _torques(boom.geometry.L7 + q4, (c2, c3, ct), (s2, s3, st), U, _NOTHING)
+    tau = np.empty((5, len(q)))
+    for row, torque in zip(tau, torques, strict=True):
+        row[:] = torque
     return tau.T
 
 
