@@ -282,7 +282,7 @@ def peak_rate_ratios(boom: Boom, motion: Motion, t: Array) -> tuple[float, float
     """Return the largest ratios of joint velocity, acceleration, jerk to their limits at t (n,)."""
     limits = boom.limits
     if isinstance(motion.path, JointLine):  # the largest rates of the law decide
-        peaks = (float(np.abs(motion.law.s(t, order)).max()) for order in (1, 2, 3))
+        peaks = (float(np.abs(rate).max()) for rate in motion.law.s.derivatives(t, 3)[1:])
         velocity, acceleration, jerk = (peak / limit for peak, limit in zip(peaks, path_limits(boom, motion.path), strict=True))
         return velocity, acceleration, jerk
     _, *rates = motion(t)

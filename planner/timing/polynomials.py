@@ -46,12 +46,14 @@ class Polynomials:
     def _placed(self, t: ArrayLike) -> tuple[Array, NDArray[np.intp]]:
         """Return t less the start of its piece, and the index of the piece."""
         t = np.asarray(t, dtype=float)
-        piece = np.clip(np.searchsorted(self.x, t, side="right") - 1, 0, len(self.x) - 2)
+        piece = np.searchsorted(self.x[1:-1], t, side="right")
         return t - self.x[piece], piece
 
     def _evaluated(self, along: Array, piece: NDArray[np.intp], order: int) -> Array:
-        total, power = np.zeros(along.shape), np.ones(along.shape)
-        for k in range(order, len(self.c)):  # in SciPy's order, to its last bit
+        if order >= len(self.c):
+            return np.zeros(along.shape)
+        total, power = self.c[-1 - order][piece] * float(perm(order, order)), along
+        for k in range(order + 1, len(self.c)):  # in SciPy's order, to its last bit
             total = total + self.c[-1 - k][piece] * power * float(perm(k, order))
             power = power * along
-        return total
+        return np.asarray(total)

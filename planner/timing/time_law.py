@@ -83,7 +83,8 @@ class TimeLaw:
             at = middle - shift
             inside = np.clip(at, 0.0, self.duration)
             running = (at > 0.0) & (at < self.duration)
-            taylor = np.array([np.where(running, integral(inside, k), 0.0) / factorial(k) for k in range(order)])
+            values = integral.derivatives(inside, order - 1)
+            taylor = np.array([np.where(running, value, 0.0) / factorial(k) for k, value in enumerate(values)])
             after = at >= self.duration
             taylor[0] += np.where(after, float(integral(self.duration)) + at - self.duration, 0.0)
             taylor[1] += after
