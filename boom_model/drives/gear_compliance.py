@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from boom_model.arrays import Array, Mask, broadcast
 from boom_model.boom import JOINTS, Boom
 from boom_model.drives.drive import Drive, Gearbox
-from boom_model.kinematics.forward import jacobian
+from boom_model.kinematics.forward import position_jacobian
 
 
 def wind_up(gearbox: Gearbox, torque: ArrayLike) -> Array | None:
@@ -65,7 +65,7 @@ def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
         InputError: q or tau is not finite or not (..., 5), or they do not broadcast.
     """
     q, tau = broadcast(q=q, tau=tau)
-    J = np.moveaxis(jacobian(boom, q), (-2, -1), (0, 1))[:3]
+    J = np.moveaxis(position_jacobian(boom, q), (-2, -1), (0, 1))
     moved = np.zeros((3, *tau.shape[:-1]))
     widths = {"backlash": np.zeros(5), "hysteresis": np.zeros(5), "step": np.zeros(5)}
     uncounted = []

@@ -99,8 +99,12 @@ def gravity_torque(boom: Boom, q: ArrayLike, *, base: BaseMotion | None = None) 
     q = checked("q", q, 5)
     if q.ndim == 1 or not boom.geometry.is_parallelogram or (base is not None and base.moves):
         return inverse_dynamics(boom, q, np.zeros(5), np.zeros(5), base=base, reactions=False).tau
+    states, tau = q.reshape(-1, 5), np.empty((5, q.size // 5)).T
     up = None if base is None else matched("base up", base.up, q.shape[:-1])
-    return weight_torque(boom, q.reshape(-1, 5), up).reshape(q.shape)
+    for start in range(0, len(states), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        tau[part] = weight_torque(boom, states[part], None if up is None else up[part])
+    return tau.reshape(q.shape)
 
 
 def forward_dynamics(
