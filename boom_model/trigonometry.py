@@ -11,7 +11,7 @@ Angle = TypeVar("Angle", Array, float, Array | float)
 
 
 def cosine_and_sine(angle: Angle) -> tuple[Angle, Angle]:
-    """Return cosine and sine of an angle [rad], in its shape, to 3e-16.
+    """Return cosine and sine of an angle [rad], in its shape, to 4e-16.
 
         t = tan(angle / 2),  u = 2 / (1 + t^2),  cos = u - 1,  sin = u t
 
