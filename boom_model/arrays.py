@@ -16,7 +16,10 @@ _SMALL = 1000
 
 
 def read_only(values: ArrayLike, order: Literal["K", "F"] = "K") -> Array:
-    """Return a float64 copy that cannot be written to, in memory as `values` or column by column ("F")."""
+    """Return a float64 copy that cannot be written to.
+
+    In memory it is ordered as `values`, or column by column with "F".
+    """
     array = np.array(values, dtype=float, order=order)
     array.flags.writeable = False
     return array

@@ -171,7 +171,7 @@ def inverse_dynamics(
 
 
 def weight_torque(boom: Boom, q: Array, up: Array | None = None) -> Array:
-    """Return the torque (n, 5) that carries bodies and payload at rest at q (n, 5); of a parallelogram alone.
+    """Return the torque (n, 5) that carries bodies and payload at rest, for a parallelogram.
 
     Without motion, A is minus gravity for the origin o and 0 for every other vector b.
 
@@ -451,7 +451,7 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
 
 
 def _fill_level(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value]) -> None:
-    """Fill A but for rho e3, as `_fill_moving`, for a base at rest: the plane turns about z alone."""
+    """Fill A but for rho e3 with a base at rest: the plane turns about z alone."""
     Ax, Az, An = A
     w, d = plane.W[1], plane.W1[1]
     square = w * w
@@ -501,7 +501,10 @@ def _fill_moving(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: S
 def _torques(
     rho: _Value, C: Sequence[_Value], S: Sequence[_Value], U: Any, moment: _Vector
 ) -> tuple[tuple[_Value, ...], _Value]:
-    """Return the joint torques, and the moment of all beyond the actuator about its axis, from U along x, z and n."""
+    """Return the joint torques, and the moment of all beyond the actuator about its axis.
+
+    U: along x, z and n.
+    """
     Ux, Uz, Un = U
     (c2, c3, ct), (s2, s3, st) = C, S
     on_tool = _about(ct, st, Ux, Uz, _ET, _PT) - moment[2]
@@ -521,9 +524,10 @@ def _about(c: _Value, s: _Value, Ux: Sequence[_Value], Uz: Sequence[_Value], e: 
 
 
 def _single(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array | None:
-    """Return the torques (5,) of one state on level ground, without what `inverse_dynamics` prepares for many.
+    """Return the torques (5,) of one state on level ground, without the preparations for many.
 
-    None for a linkage that is no parallelogram, and for other inputs than three finite arrays (5,).
+    None for a linkage that is no parallelogram, and for other inputs than three finite arrays
+    (5,).
     """
     numbers = []
     for x in (q, qd, qdd):

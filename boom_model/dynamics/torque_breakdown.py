@@ -68,7 +68,8 @@ def breakdown(
 
     bare, still = tau(empty, None), tau(boom, None)
     zero = np.zeros_like(bare)
-    gravity = inverse_dynamics(empty, q, zero, zero, reactions=False).tau  # rounded as `bare`, so that rest leaves 0
+    # Rounded as `bare`, so that rest leaves 0.
+    gravity = inverse_dynamics(empty, q, zero, zero, reactions=False).tau
     velocity = velocity_torque(empty, q, qd)
     return Breakdown(
         gravity=gravity,

@@ -93,7 +93,10 @@ def position_jacobian(boom: Boom, q: ArrayLike) -> Array:
 
 
 def _linear_jacobian(boom: Boom, q: Array) -> Array:
-    """Return the upper rows of `_actuator_jacobian`, (3, 5, ...): an entry of all states is one run of numbers."""
+    """Return the upper rows of `_actuator_jacobian`, (3, 5, ...).
+
+    In memory, each entry of all states is one run of numbers.
+    """
     g = boom.geometry
     rho = g.L7 + q[..., 3]
     (c1, s1), (c2, s2), (c3, s3) = (cosine_and_sine(q[..., i]) for i in range(3))

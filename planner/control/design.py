@@ -252,7 +252,10 @@ def _law(plant: Plant, gains: Gains, q: Array, T: float) -> Any:
 
 
 def _response(system: Any, f: Array) -> Any:
-    """Return C (z - A)^-1 B + D (k, 5, 5) on the unit circle; python-control solves for one frequency at a time."""
+    """Return C (z - A)^-1 B + D (k, 5, 5) on the unit circle.
+
+    python-control solves for one frequency at a time.
+    """
     z = np.exp(2j * np.pi * f * system.dt)[:, None, None]
     states = np.linalg.solve(z * np.eye(len(system.A)) - system.A, np.broadcast_to(system.B, (len(f), *system.B.shape)))
     return system.C @ states + system.D

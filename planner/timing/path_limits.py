@@ -170,7 +170,7 @@ def demand_ratios(boom: Boom, path: Path, law: TimeLaw, t: Array, base: BaseMoti
 
 
 def _along(path: Path, law: TimeLaw, t: Array) -> tuple[Array, Array, Array, Array]:
-    """Return q, p', qd and qdd of a law at times t (n,), each (n, 5), a joint after the other in memory."""
+    """Return q, p', qd and qdd (n, 5) of a law at times t (n,), joint by joint in memory."""
     s, v, u = law.s.derivatives(t, 2)
     s = np.clip(s, 0.0, 1.0)
     q, p1, p2 = (path(s, order).T for order in range(3))

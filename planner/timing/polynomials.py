@@ -11,7 +11,9 @@ from boom_model.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Polynomials:
-    """Polynomials between breaks, evaluated as SciPy's `PPoly`, which takes longer to import than a move to plan.
+    """Polynomials between breaks, evaluated as SciPy's `PPoly`.
+
+    Importing that takes longer than planning a move.
 
     p(t) = sum_k c[k] (t - x[i])^(powers - 1 - k)  for x[i] <= t < x[i + 1]
     """

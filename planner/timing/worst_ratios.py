@@ -86,7 +86,7 @@ def worst_of(boom: Boom, motions: Sequence[Motion], parts: Sequence[States], ave
 
 
 def _largest(limit: Limit, t: Array, ratio: Array) -> WorstRatio:
-    """Return the largest of the ratios (n, 5) at times t (n,); of equal ones the first, of the first joint."""
+    """Return the largest of the ratios (n, 5) at times t (n,), the first of equal ones."""
     at = ratio.argmax(axis=0).tolist()
     joint = min(range(len(at)), key=lambda i: (-ratio[at[i], i], at[i]))
     return WorstRatio(limit, JOINTS[joint], float(ratio[at[joint], joint]), float(t[at[joint]]))

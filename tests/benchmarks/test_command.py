@@ -20,7 +20,10 @@ def cpu_seconds(*arguments: str, where: Path) -> float:
 
 
 def test_a_plan_takes_about_three_imports_of_rerun(tmp_path: Path):
-    """2.1, or 2.8 where pandas is installed, which pyarrow then imports; the move itself is a tenth of it."""
+    """2.1, or 2.8 where pandas is installed, which pyarrow then imports.
+
+    The move itself is a tenth of it.
+    """
     processes = {"rerun": ("-c", "import rerun"), "plan": ("-m", "planner", "plan", "transport", "phenotyping")}
     spent = {name: [] for name in processes}
     for _ in range(ROUNDS):

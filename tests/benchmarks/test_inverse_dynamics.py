@@ -132,7 +132,10 @@ def test_large_batch_takes_under_half_of_pinocchios_time():
 
 
 def test_a_single_state_against_pinocchios_rnea():
-    """7.5 of `rnea` alone on the open tree, which is 1.5 us of C++; 2.2 of `rnea` with the loop map that closes the linkage."""
+    """7.5 of `rnea` alone on the open tree, which is 1.5 us of C++.
+
+    2.2 of `rnea` with the loop map that closes the linkage.
+    """
     q, qd, qdd = (x[0] for x in some_states(1))
     model, G = fixed_root(pinocchio_model(BOOM)), tree_matrix(BOOM)
     data, tree = model.createData(), [G @ x for x in (q, qd, qdd)]

@@ -204,17 +204,21 @@ def breakable_rows(rows: _Rows, demands: PathDynamics) -> _Rows:
 
 
 def limit_rows(demands: PathDynamics, x: Array, *, moving: bool | None = None) -> _Rows:
-    """Conditions a u + b x + c <= 1 as three arrays (n, m), the drives' curves taken at their tangent at x (n,).
+    """Return conditions a u + b x + c <= 1 as three arrays (n, m).
+
+    The drives' curves are taken at their tangents.
 
     Args:
         demands: the terms of the joint torques.
         x: where the tangents touch, (n,).
-        moving: whether to return only the rows that change with the tangents, or only the others; None is all.
+        moving: whether to return only the rows that change with the tangents, or only the others;
+            None is all.
     """
     boom = demands.boom
     at_rest, gears, inertias = motor_limits(boom, np.zeros(5)), gear_limits(boom), rotors(boom)
     intercepts, slopes = (part.T for part in demands.friction_tangent(x))
-    kinds: list[tuple[int, float, float, float, float, float]] = []  # joint, sign, limit, shares of load, p', p'' and friction
+    # Joint, sign, limit; share of the load, inertia, share of the friction.
+    kinds: list[tuple[int, float, float, float, float, float]] = []
     curved = {}
     for i, drive in enumerate(boom.drives):
         if not moving:
