@@ -112,8 +112,8 @@ def test_time(benchmark, count, method):
         benchmark.extra_info["us_per_sample"] = 1e6 * benchmark.stats.stats.min / count
 
 
-def test_large_batch_takes_under_half_of_pinocchios_time():
-    """Torques alone take 0.23 to 0.31 of it, on a busy machine too; 0.33 to 0.43 with the reactions is too near to assert."""
+def test_large_batch_takes_under_a_quarter_of_pinocchios_time():
+    """Torques alone take 0.16 of it, and 0.23 with the reactions."""
     count = COUNTS[-1]
     states = some_states(count)
     runs = {method: method(*(x[:LOOPED] if method in LOOPS else x for x in states)) for method in METHODS}
@@ -128,7 +128,7 @@ def test_large_batch_takes_under_half_of_pinocchios_time():
             best[method] = min(best[method], 1e6 * (time.process_time() - start) / len(tau))
     for method, spent in best.items():
         print(f"{method.__name__:20} {spent:7.3f} us/sample {spent / best[pinocchio_parallel]:6.2f} of Pinocchio's")
-    assert best[ours] < 0.5 * best[pinocchio_parallel]
+    assert best[ours] < 0.25 * best[pinocchio_parallel]
 
 
 def test_a_single_state_against_pinocchios_rnea():

@@ -36,8 +36,8 @@ BOOM = Boom.load()
 PATH = JointLine(BOOM.pose("transport"), BOOM.pose("phenotyping"))
 ROUNDS = 9  # of both in turn, of which the best counts
 PEER_SAMPLES = 5_001
-MOST = {"time-optimal": 0.5, "jerk-limited": 1.0, "jerk bound": 2.5}
-"""Share of the peer's time that a motion may take, checks not counted; 0.45, 0.28 and 2.2 were
+MOST = {"time-optimal": 0.48, "jerk-limited": 0.25, "jerk bound": 2.3}
+"""Share of the peer's time that a motion may take, checks not counted; 0.40, 0.20 and 1.9 were
 seen."""
 TIMINGS = {
     "time-optimal": Timing.of("time-optimal"),
@@ -122,7 +122,7 @@ def test_time(benchmark, name, method):
 
 @pytest.mark.parametrize("name", BOOMS)
 def test_planning_takes_no_longer_than_the_peers_and_keeps_what_that_breaks(name):
-    """0.37 to 0.74 of the peer's time were seen."""
+    """0.33 to 0.64 of the peer's time were seen."""
     boom, best, planned = BOOMS[name], dict.fromkeys(METHODS, np.inf), {}
     for _ in range(ROUNDS):
         for method in METHODS:
@@ -139,7 +139,7 @@ def test_planning_takes_no_longer_than_the_peers_and_keeps_what_that_breaks(name
     assert kept[peers]["motor at standstill"] <= 1.001
     if boom is not BOOM:
         assert kept[peers]["motor on its curve"] > 1.5
-    assert best[ours] < best[peers]
+    assert best[ours] < 0.8 * best[peers]
 
 
 WHOLE = {
@@ -159,7 +159,7 @@ take."""
 
 
 def test_a_whole_plan_takes_few_times_as_long_as_the_peers_law_alone():
-    """0.86, 0.67, 2.3 and 0.38 of the peer's time were seen, and a tenth more on a busy machine."""
+    """0.85 to 0.95, 0.7, 2.4 and 0.4 of the peer's time were seen."""
     jobs = {"peer": (peers(BOOM), 1.0), **WHOLE}
     best = dict.fromkeys(jobs, np.inf)
     for _ in range(ROUNDS):
