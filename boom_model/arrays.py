@@ -1,6 +1,7 @@
 """Checks of arrays at the public boundary, and read-only arrays for frozen data."""
 
 from math import isfinite
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,10 +11,16 @@ from boom_model.errors import InputError
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+_SMALL = 1000
+"""Size of an array up to which one sum is quicker than a look at every entry."""
 
-def read_only(values: ArrayLike) -> Array:
-    """Return a float64 copy that cannot be written to."""
-    array = np.array(values, dtype=float)
+
+def read_only(values: ArrayLike, order: Literal["K", "F"] = "K") -> Array:
+    """Return a float64 copy that cannot be written to.
+
+    In memory it is ordered as `values`, or column by column with "F".
+    """
+    array = np.array(values, dtype=float, order=order)
     array.flags.writeable = False
     return array
 
@@ -37,8 +44,9 @@ def checked(name: str, values: ArrayLike, last: int | None = None) -> Array:
     if last is not None and (array.ndim == 0 or array.shape[-1] != last):
         raise InputError(f"{name} has shape {array.shape}; its last axis must have length {last}")
     # A sum of squares is finite where all is, short of overflow: the one quick look at a small
-    # array.
-    if not isfinite(np.vdot(array, array)) and not np.isfinite(array).all():
+    # array. BLAS would take a large one on several threads, which wait for their turn on a busy
+    # machine.
+    if not (array.size <= _SMALL and isfinite(np.vdot(array, array))) and not np.isfinite(array).all():
         index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f"{name}[{', '.join(map(str, index))}]" if index else name
         raise InputError(f"{where} is {array[index]}; it must be a finite number")

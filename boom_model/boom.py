@@ -242,13 +242,20 @@ class Friction:
     def torque(self, qd: ArrayLike) -> Array:
         """Return the torque (..., 5) against friction at joint velocities qd (..., 5) [Nm, N]."""
         qd = np.asarray(qd, dtype=float)
-        torque: Array = self.viscous * qd + self.dry(np.sign(qd))
+        torque: Array = self.viscous * qd + self.dry(np.sign(qd)) if self.any else np.zeros(qd.shape)
         return torque
+
+    @cached_property
+    def any(self) -> bool:
+        """Whether any joint has friction."""
+        return bool(self.viscous.any() or self.coulomb.any() or self.asymmetric.any())
 
     def dry(self, direction: ArrayLike) -> Array:
         """Return the part that does not grow with speed, for directions -1, 0 or 1 (..., 5)."""
         direction = np.asarray(direction, dtype=float)
-        torque: Array = self.coulomb * direction + self.asymmetric * np.abs(direction)
+        torque: Array = np.zeros(direction.shape)
+        if self.any:
+            torque = self.coulomb * direction + self.asymmetric * np.abs(direction)
         return torque
 
 

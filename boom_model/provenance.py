@@ -25,8 +25,10 @@ class Basis(StrEnum):
 
         A result is only as reliable as the weakest value that decides it.
         """
-        order = list(Basis)
-        return max(bases, key=order.index, default=Basis.PRINTED)
+        return max(bases, key=_ORDER.__getitem__, default=Basis.PRINTED)
+
+
+_ORDER = {basis: rank for rank, basis in enumerate(Basis)}
 
 
 @dataclass(frozen=True)

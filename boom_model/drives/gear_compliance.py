@@ -10,7 +10,7 @@ from boom_model.arrays import Array, Mask, broadcast
 from boom_model.boom import JOINTS, Boom
 from boom_model.drives.drive import Drive
 from boom_model.drives.wind_up import wind_up
-from boom_model.kinematics.forward import jacobian
+from boom_model.kinematics.forward import position_jacobian
 from boom_model.tip_uncertainty import tip_deviation
 
 SURE = 2.0
@@ -53,8 +53,8 @@ def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
         InputError: q or tau is not finite or not (..., 5), or they do not broadcast.
     """
     q, tau = broadcast(q=q, tau=tau)
-    J = jacobian(boom, q)[..., :3, :]
-    yields = np.zeros(tau.shape)
+    J = np.moveaxis(position_jacobian(boom, q), (-2, -1), (0, 1))
+    moved = np.zeros((3, *tau.shape[:-1]))
     widths = {"backlash": np.zeros(5), "hysteresis": np.zeros(5), "step": np.zeros(5)}
     uncounted, share = [], np.ones(5) if boom.calibration is None else boom.calibration.wind_up
     for i, drive in enumerate(boom.drives):
@@ -63,19 +63,19 @@ def tip_deflection(boom: Boom, q: ArrayLike, tau: ArrayLike) -> TipDeflection:
             continue
         angle = wind_up(drive.gearbox, tau[..., i])
         if angle is not None:
-            yields[..., i] = -share[i] * angle
+            moved -= J[:, i] * (share[i] * angle)
         known = {"wind-up": angle, "backlash": drive.gearbox.backlash, "hysteresis": drive.gearbox.hysteresis}
         known["microstep error"] = step = _step_error(drive)
         uncounted += [f"{JOINTS[i]}: no {name} is printed" for name, value in known.items() if value is None]
         for name, value in zip(widths, (drive.gearbox.backlash, drive.gearbox.hysteresis, step), strict=True):
             widths[name][i] = value or 0.0
-    moved = sum((J[..., i] * yields[..., i, None] for i, drive in enumerate(boom.drives) if drive), np.zeros(J.shape[:-1]))
+    lost = np.moveaxis(moved, 0, -1)
     sd = tip_deviation(boom, q, tau)
-    geometry = np.zeros(J.shape[:-2]) if sd is None else sd
+    geometry = np.zeros(q.shape[:-1]) if sd is None else sd
     if np.isnan(geometry).any():
         uncounted.append("geometry, where the linkage is flat")
     counted = {name: _worst(J, width) for name, width in widths.items()}
-    return TipDeflection(moved, **counted, geometry=np.nan_to_num(geometry), uncounted=tuple(uncounted))
+    return TipDeflection(lost, **counted, geometry=np.nan_to_num(geometry), uncounted=tuple(uncounted))
 
 
 def gear_stiffness(drives: tuple[Drive | None, ...]) -> tuple[Array, Mask]:
@@ -107,16 +107,16 @@ def _step_error(drive: Drive) -> float | None:
 
 
 def _worst(J: Array, widths: Array) -> Array:
-    """Return the largest |sum_i +-J_i w_i| (...) over all signs, for J (..., 3, 5).
+    """Return the largest |sum_i +-J_i w_i| (...) over all signs, for J (3, 5, ...).
 
     The first sign can be fixed, because the magnitude does not depend on a common sign.
     """
-    moves = [J[..., i] * widths[i] for i in np.flatnonzero(widths)]
+    moves = [J[:, i] * widths[i] for i in np.flatnonzero(widths)]
     if not moves:
-        return np.zeros(J.shape[:-2])
+        return np.zeros(J.shape[2:])
     squares = []
     for signs in product((1.0, -1.0), repeat=len(moves) - 1):
         total = sum((sign * move for sign, move in zip(signs, moves[1:], strict=True)), moves[0])
-        squares.append(np.square(total).sum(axis=-1))
+        squares.append(np.square(total).sum(axis=0))
     worst: Array = np.sqrt(np.maximum.reduce(squares))
     return worst

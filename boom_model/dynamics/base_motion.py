@@ -56,6 +56,11 @@ class BaseMotion:
         ready["up"] = ready["up"] / length
         return BaseMotion(**{name: read_only(values) for name, values in ready.items()})
 
+    @property
+    def moves(self) -> bool:
+        """Whether the base turns or accelerates anywhere, besides being tilted."""
+        return any(x.any() for x in (self.angular_velocity, self.angular_acceleration, self.acceleration))
+
 
 def up_on_slope(roll: ArrayLike, pitch: ArrayLike) -> Array:
     """Return `up` (..., 3) of a base on a slope, given its roll and pitch [rad].

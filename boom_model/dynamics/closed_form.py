@@ -37,6 +37,9 @@ _PAIRS = np.triu_indices(7)
 """Pairs of rates: of the plane about z, theta2' to theta5', of the plane about x and about n."""
 
 _JOINT_PAIRS = np.triu_indices(5)
+_ONE_THREAD = 2**18
+"""Multiplications of a product that OpenBLAS takes on one thread; see `newton_euler`."""
+
 _FIRST_PAIR = 10
 """Column of the first pair in `Forms.moving`."""
 
@@ -112,7 +115,14 @@ def _evaluate(forms: Array, f: Array) -> Array:
     products = f.take(_PRODUCTS[0], axis=1) * f.take(_PRODUCTS[1], axis=1)
     if count == 1:  # BLAS rounds a vector's product differently; a state must not depend on its batch
         return (np.concatenate([products, products]) @ forms)[:1].reshape(1, 5, coefficients)
-    return (products @ forms).reshape(count, 5, coefficients)
+    parts = -(-count * forms.size // _ONE_THREAD)
+    if parts <= 1:
+        return (products @ forms).reshape(count, 5, coefficients)
+    values = np.empty((count, forms.shape[1]))
+    for k in range(parts):
+        part = slice(count * k // parts, count * (k + 1) // parts)
+        np.matmul(products[part], forms, out=values[part])
+    return values.reshape(count, 5, coefficients)
 
 
 def _times(G: Array, causes: Array) -> Array:

@@ -11,7 +11,7 @@ from boom_model.arrays import Array, broadcast, checked
 from boom_model.boom import Boom
 from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.dynamics.closed_form import mass_and_bias, mass_forms
-from boom_model.dynamics.newton_euler import BASE_ENTRIES, inverse_dynamics, matched
+from boom_model.dynamics.newton_euler import BASE_ENTRIES, inverse_dynamics, matched, weight_torque
 from boom_model.kinematics.frames import body_transforms
 
 _CHUNK = 1280
@@ -95,7 +95,15 @@ def gravity_torque(boom: Boom, q: ArrayLike, *, base: BaseMotion | None = None) 
     Raises:
         InputError: q is not finite or not (..., 5).
     """
-    return inverse_dynamics(boom, q, np.zeros(5), np.zeros(5), base=base, reactions=False).tau
+    q = checked("q", q, 5)
+    if q.ndim == 1 or not boom.geometry.is_parallelogram or (base is not None and base.moves):
+        return inverse_dynamics(boom, q, np.zeros(5), np.zeros(5), base=base, reactions=False).tau
+    states, tau = q.reshape(-1, 5), np.empty((5, q.size // 5)).T
+    up = None if base is None else matched("base up", base.up, q.shape[:-1])
+    for start in range(0, len(states), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        tau[part] = weight_torque(boom, states[part], None if up is None else up[part])
+    return tau.reshape(q.shape)
 
 
 def forward_dynamics(

@@ -20,7 +20,7 @@ All this holds for a parallelogram. Where the links are unequal, `virtual_work` 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import tan
+from math import isfinite
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -32,6 +32,7 @@ from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.dynamics.virtual_work import balance
 from boom_model.errors import InputError
 from boom_model.kinematics.frames import R_LINK_BODY
+from boom_model.trigonometry import cosine_and_sine
 
 PayloadAs = Literal["mass", "force"]
 
@@ -41,6 +42,8 @@ its products on one thread: a second one gains nothing on so thin a matrix, and 
 on a busy machine."""
 
 _O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
+_ONE = (5,)
+_NOTHING = (0.0, 0.0, 0.0)
 BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
 _LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
 
@@ -119,6 +122,11 @@ def inverse_dynamics(
     """
     if payload_as not in ("mass", "force"):
         raise InputError(f"payload_as is {payload_as!r}; it must be 'mass' or 'force'")
+    plain = base is None and tip_force is None and tip_moment is None and payload_as == "mass"
+    if plain and not (reactions or friction or drive_inertia):
+        tau = _single(boom, q, qd, qdd)
+        if tau is not None:
+            return Loads(tau, None, None)
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [x.reshape(-1, 5) for x in (positions, rates, accelerations)]
@@ -127,9 +135,9 @@ def inverse_dynamics(
     twist = None if tip_moment is None else matched("tip_moment", tip_moment, shape)
     count = len(motion[0])
     out = _Outputs(
-        np.empty((count, 5)),
-        np.zeros((3, count, 3)) if reactions else None,
-        np.empty((count, 6)) if reactions else None,
+        np.empty((5, count)).T,
+        np.zeros((3, 3, count)).swapaxes(1, 2) if reactions else None,
+        np.empty((6, count)).T if reactions else None,
     )
     model = regrouped(boom, payload_as) if boom.geometry.is_parallelogram else None
     rotors = boom.drive_inertia if drive_inertia else None
@@ -161,6 +169,29 @@ def inverse_dynamics(
     return Loads(out.tau.reshape(positions.shape), pins, mount)
 
 
+def weight_torque(boom: Boom, q: Array, up: Array | None = None) -> Array:
+    """Return the torque (n, 5) that carries bodies and payload at rest, for a parallelogram.
+
+    Without motion, A is minus gravity for the origin o and 0 for every other vector b.
+
+    Args:
+        boom: the boom.
+        q: (n, 5) joint positions.
+        up: (n, 3) unit vector against gravity, along frame 1; None on level ground.
+    """
+    state = _State(*[list(np.ascontiguousarray(q.T))] * 3)
+    x, z, n = (0.0, boom.gravity, 0.0) if up is None else (boom.gravity * a for a in _into_plane(state, list(up.T)))
+    Q = regrouped(boom, "mass").torque_rows[:, _O].tolist()
+    U = tuple([moment * along for moment in Q] for along in (x, z, n))
+    _, q2, q3, q4, q5 = state.q
+    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q2), cosine_and_sine(q3), cosine_and_sine(q3 + q5)
+    torques, _ = _torques(boom.geometry.L7 + q4, (c2, c3, ct), (s2, s3, st), U, _NOTHING)
+    tau = np.empty((5, len(q)))
+    for row, torque in zip(tau, torques, strict=True):
+        row[:] = torque
+    return tau.T
+
+
 def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
     """Force (..., 3) [N] that the inner link carries at its upper pin, in frame 5 of the inner loop: x along the link.
 
@@ -187,7 +218,7 @@ def base_series(base: BaseMotion | None, shape: tuple[int, ...]) -> list[Array]:
 def element_accelerations(boom: Boom, q: Array, qd: Array, qdd: Array, *base: Array) -> Array:
     """Return A (3, 11, n) of n states (n, 5) along x, z and n, on a base moved as `base_series` says."""
     state = _State(*(list(np.ascontiguousarray(x.T)) for x in (q, qd, qdd)))
-    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
+    (c2, s2), (c3, s3), (ct, st) = (cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
     plane = _plane(boom, state, *(list(x.T) for x in base))
     return np.asarray(_accelerations(state, plane, (c2, c3, ct), (s2, s3, st), boom.geometry.L7 + q[:, 3]))
 
@@ -198,7 +229,7 @@ def element_velocities(boom: Boom, q: Array) -> Array:
     Yaw turns the plane about z: x goes to -n, n to x. An angle turns its links' e to p, and p to
     -e.
     """
-    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
+    (c2, s2), (c3, s3), (ct, st) = (cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
     rho = boom.geometry.L7 + q[:, 3]
     moved = np.zeros((5, 3, 11, len(q)))
     moved[0, 0, _N] = 1.0
@@ -324,9 +355,13 @@ class _Plane(NamedTuple):
     """a0 minus gravity"""
     W: _Vector
     W1: _Vector
+    level: bool
+    """Whether the base is at rest on level ground."""
 
 
 class _Outputs(NamedTuple):
+    """Results of a chunk. In memory, each component of all states is one run of numbers."""
+
     tau: Array
     pins: Array | None
     """(3, n, 3)"""
@@ -372,7 +407,7 @@ def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 def _into_plane(state: _State, vector: Sequence[_Value]) -> _Vector:
     """Return the components of a vector, given along frame 1, along x, z and n of the plane."""
-    c, s = _cosine_and_sine(state.q[0])
+    c, s = cosine_and_sine(state.q[0])
     return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
 
 
@@ -380,7 +415,7 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     rate, accel = state.qd[0], state.qdd[0]
     if not base:
         level = (0.0, boom.gravity, 0.0)
-        return _Plane(level, level, (0.0, rate, 0.0), (0.0, accel, 0.0))
+        return _Plane(level, level, (0.0, rate, 0.0), (0.0, accel, 0.0), True)
     angular_velocity, angular_acceleration, acceleration, up = (_into_plane(state, x) for x in base)
     w1, w2, w3 = angular_velocity
     d1, d2, d3 = angular_acceleration
@@ -388,7 +423,7 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     a = (acceleration[0] + lift[0], acceleration[1] + lift[1], acceleration[2] + lift[2])
     # The yaw axis is the plane's z: W' = base's + theta1'' z + W_base x theta1' z (thesis, eq.
     # 2.40).
-    return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1))
+    return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1), False)
 
 
 def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> _Rows:
@@ -399,6 +434,45 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
     C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
     """
     A: Any = [[0.0] * 11, [0.0] * 11, [0.0] * 11] if isinstance(rho, float) else np.empty((3, 11, *rho.shape))
+    Ax, Az, An = A
+    if plane.level:
+        _fill_level(A, state, plane, C, S)
+    else:
+        _fill_moving(A, state, plane, C, S)
+    c, s, slide = C[1], S[1], 2.0 * state.qd[3]
+    turning = slide * (state.qd[2] + plane.W[2])
+    Ax[_RHO] = rho * Ax[_E3] + (state.qdd[3] * c - turning * s)
+    Az[_RHO] = rho * Az[_E3] + (state.qdd[3] * s + turning * c)
+    across = plane.W[1] * c if plane.level else plane.W[1] * c - plane.W[0] * s
+    An[_RHO] = rho * An[_E3] - slide * across
+    rows: _Rows = A
+    return rows
+
+
+def _fill_level(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value]) -> None:
+    """Fill A but for rho e3 with a base at rest: the plane turns about z alone."""
+    Ax, Az, An = A
+    w, d = plane.W[1], plane.W1[1]
+    square = w * w
+    Ax[_O], Az[_O], An[_O] = plane.a
+    Ax[_X], Az[_X], An[_X] = -square, 0.0, -d
+    Ax[_Z], Az[_Z], An[_Z] = 0.0, 0.0, 0.0
+    Ax[_N], Az[_N], An[_N] = d, 0.0, -square
+    qd, qdd = state.qd, state.qdd
+    rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
+    for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
+        along_z = rate * rate
+        along_x, m = along_z + square, 2.0 * rate * w
+        Ax[e] = -along_x * c - accel * s
+        Az[e] = accel * c - along_z * s
+        An[e] = m * s - d * c
+        Ax[p] = along_x * s - accel * c
+        Az[p] = -accel * s - along_z * c
+        An[p] = m * c + d * s
+
+
+def _fill_moving(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value]) -> None:
+    """Fill A but for rho e3."""
     Ax, Az, An = A
     w1, w2, w3 = plane.W
     d1, d2, d3 = plane.W1
@@ -421,13 +495,54 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
         Ax[p] = along_x * s - less * c
         Az[p] = -more * s - along_z * c
         An[p] = m * c - k * s
-    c, s, slide = C[1], S[1], 2.0 * qd[3]
-    turning = slide * (qd[2] + w3)
-    Ax[_RHO] = rho * Ax[_E3] + (qdd[3] * c - turning * s)
-    Az[_RHO] = rho * Az[_E3] + (qdd[3] * s + turning * c)
-    An[_RHO] = rho * An[_E3] + slide * (w1 * s - w2 * c)
-    rows: _Rows = A
-    return rows
+
+
+def _torques(
+    rho: _Value, C: Sequence[_Value], S: Sequence[_Value], U: Any, moment: _Vector
+) -> tuple[tuple[_Value, ...], _Value]:
+    """Return the joint torques, and the moment of all beyond the actuator about its axis.
+
+    U: along x, z and n.
+    """
+    Ux, Uz, Un = U
+    (c2, c3, ct), (s2, s3, st) = C, S
+    on_tool = _about(ct, st, Ux, Uz, _ET, _PT) - moment[2]
+    beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
+    # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
+    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
+    tau_1 = Ux[_N] - Un[_X] - reach - moment[1]
+    tau_2 = _about(c2, s2, Ux, Uz, _E2, _P2)
+    tau_3 = _about(c3, s3, Ux, Uz, _E3, _P3) + beyond_actuator
+    tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
+    return (tau_1, tau_2, tau_3, tau_4, on_tool), beyond_actuator
+
+
+def _about(c: _Value, s: _Value, Ux: Sequence[_Value], Uz: Sequence[_Value], e: int, p: int) -> _Value:
+    """Return (b_e x U_e + b_p x U_p) . n."""
+    return c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
+
+
+def _single(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array | None:
+    """Return the torques (5,) of one state on level ground, without the preparations for many.
+
+    None for a linkage that is no parallelogram, and for other inputs than three finite arrays
+    (5,).
+    """
+    numbers = []
+    for x in (q, qd, qdd):
+        if type(x) is not np.ndarray or x.shape != _ONE or x.dtype != np.float64:
+            return None
+        numbers.append(x.tolist())
+    state = _State(*numbers)
+    if not (isfinite(sum(state.q) + sum(state.qd) + sum(state.qdd)) and boom.geometry.is_parallelogram):
+        return None
+    _, q2, q3, q4, q5 = state.q
+    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q2), cosine_and_sine(q3), cosine_and_sine(q3 + q5)
+    rho, C, S = boom.geometry.L7 + q4, (c2, c3, ct), (s2, s3, st)
+    x, z, n = _accelerations(state, _plane(boom, state), C, S, rho)
+    U = np.array(x + z + n).reshape(3, 11).dot(regrouped(boom, "mass").torque_rows.T).tolist()
+    tau, _ = _torques(rho, C, S, U, _NOTHING)
+    return np.array(tau)
 
 
 def _newton_euler(
@@ -436,8 +551,9 @@ def _newton_euler(
     """Fill the outputs of a chunk, with a force and a moment on the tip."""
     g, q = model.boom.geometry, state.q
     rho = g.L7 + q[3]
-    (c2, s2), (c3, s3), (ct, st) = _cosine_and_sine(q[1]), _cosine_and_sine(q[2]), _cosine_and_sine(q[2] + q[4])
-    A = _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), rho)
+    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q[1]), cosine_and_sine(q[2]), cosine_and_sine(q[2] + q[4])
+    C, S = (c2, c3, ct), (s2, s3, st)
+    A = _accelerations(state, plane, C, S, rho)
     rows = model.rows if out.pins is not None else model.torque_rows
     U = np.array(A[0] + A[1] + A[2]).reshape(3, 11).dot(rows.T) if isinstance(A, list) else rows @ A
     if model.hanging:
@@ -446,35 +562,24 @@ def _newton_euler(
         )
     if force is not None:
         _put_on(U, model.tip, force)
-    mx, mz, mn = (0.0, 0.0, 0.0) if moment is None else moment
-    Ux, Uz, Un = U.tolist() if isinstance(A, list) else U
-
-    def about(c: _Value, s: _Value, e: int, p: int) -> _Value:
-        """Return (b_e x U_e + b_p x U_p) . n."""
-        turned: _Value = c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
-        return turned
-
-    on_tool = about(ct, st, _ET, _PT) - mn
-    beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
-    # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
-    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
-    tau_1 = Ux[_N] - Un[_X] - reach - mz
-    tau_2 = about(c2, s2, _E2, _P2)
-    tau_3 = about(c3, s3, _E3, _P3) + beyond_actuator
-    tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
-    tau = (tau_1, tau_2, tau_3, tau_4, on_tool)
+    moment = _NOTHING if moment is None else moment
+    U = U.tolist() if isinstance(A, list) else U
+    Ux, Uz, Un = U
+    tau, beyond_actuator = _torques(rho, C, S, U, moment)
+    tau_1, tau_2, tau_3, *_ = tau
     if isinstance(A, list):
         out.tau[0] = tau
     else:
-        np.stack(tau, axis=-1, out=out.tau)
+        for row, part in zip(out.tau.T, tau, strict=True):
+            row[:] = part
     if out.pins is None or out.mount is None:
         return
 
     # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from
     # pin 6: the moments about pins 8 and 6 give the force at pin 7 across both directions, and the
     # balance of forces the other two.
-    M_outer = about(c2, s2, 12, 13)
-    M_top = about(c3, s3, 15, 16) + beyond_actuator
+    M_outer = _about(c2, s2, Ux, Uz, 12, 13)
+    M_top = _about(c3, s3, Ux, Uz, 15, 16) + beyond_actuator
     sine = s3 * c2 - c3 * s2
     with np.errstate(divide="ignore", invalid="ignore"):
         along_inner, along_lower = np.divide(-M_top, g.L5 * sine), np.divide(-M_outer, g.L4 * sine)
@@ -483,22 +588,15 @@ def _newton_euler(
         out.pins[pin, :, 0], out.pins[pin, :, 2] = x, z
 
     rise = (s2 * Un[_E2] + c2 * Un[_P2]) + (s3 * Un[_E3] + c3 * Un[_P3]) + rho * s3 * Un[_RHO] + (st * Un[_ET] + ct * Un[_PT])
-    Mx = Un[_Z] - Uz[_N] + rise - mx
+    Mx = Un[_Z] - Uz[_N] + rise - moment[0]
     Mn = Uz[_X] - Ux[_Z] + tau_2 + tau_3
-    c1, s1 = _cosine_and_sine(q[0])
+    c1, s1 = cosine_and_sine(q[0])
     mount = out.mount
     for row, along, normal in ((0, Ux[_O], Un[_O]), (3, Mx, Mn)):
         mount[:, row] = -(c1 * along + s1 * normal)
         mount[:, row + 1] = -(s1 * along - c1 * normal)
     mount[:, 2] = -Uz[_O]
     mount[:, 5] = -tau_1
-
-
-def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
-    """By the tangent of half the angle, to 3e-16: NumPy's tangent is vectorised for doubles, its cosine and sine are not."""
-    t = tan(0.5 * angle) if isinstance(angle, float) else np.tan(0.5 * angle)
-    u = 2.0 / (1.0 + t * t)
-    return u - 1.0, u * t
 
 
 def _put_on(U: Array, g: Array, force: _Vector) -> None:

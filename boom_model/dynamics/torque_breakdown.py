@@ -1,6 +1,7 @@
 """Contributions of gravity, inertia, velocity, payload, friction and vehicle to joint torques."""
 
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,7 +9,7 @@ from numpy.typing import ArrayLike
 from boom_model.arrays import Array, broadcast
 from boom_model.boom import Boom
 from boom_model.dynamics.base_motion import BaseMotion
-from boom_model.dynamics.equations_of_motion import gravity_torque, velocity_torque
+from boom_model.dynamics.equations_of_motion import velocity_torque
 from boom_model.dynamics.newton_euler import PayloadAs, inverse_dynamics
 
 
@@ -38,6 +39,12 @@ class Breakdown:
         return total
 
 
+@lru_cache(maxsize=16)
+def _empty(boom: Boom) -> Boom:
+    """Return the boom without payload, always the same one: its regrouped masses are kept too."""
+    return boom.with_payload(0.0)
+
+
 def breakdown(
     boom: Boom,
     q: ArrayLike,
@@ -54,14 +61,16 @@ def breakdown(
         InputError: as `inverse_dynamics`.
     """
     q, qd, qdd = broadcast(q=q, qd=qd, qdd=qdd)
-    empty = boom.with_payload(0.0)
+    empty = _empty(boom)
 
     def tau(of: Boom, on: BaseMotion | None) -> Array:
         return inverse_dynamics(of, q, qd, qdd, base=on, payload_as=payload_as, reactions=False).tau
 
-    gravity, velocity = gravity_torque(empty, q), velocity_torque(empty, q, qd)
     bare, still = tau(empty, None), tau(boom, None)
     zero = np.zeros_like(bare)
+    # Rounded as `bare`, so that rest leaves 0.
+    gravity = inverse_dynamics(empty, q, zero, zero, reactions=False).tau
+    velocity = velocity_torque(empty, q, qd)
     return Breakdown(
         gravity=gravity,
         inertia=bare - gravity - velocity,

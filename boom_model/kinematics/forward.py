@@ -19,6 +19,7 @@ from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.errors import InputError
 from boom_model.kinematics.frames import BODY_FRAMES, SLIDING_ROW, Loop, frame_transforms, theta_motion
 from boom_model.kinematics.linkage import accelerations, rates, require_closed
+from boom_model.trigonometry import cosine_and_sine
 
 
 @dataclass(frozen=True)
@@ -80,24 +81,45 @@ def jacobian(boom: Boom, q: ArrayLike) -> Array:
     return _by_joints(boom, q, _actuator_jacobian(boom, _with_actuator(boom, q)))
 
 
-def _actuator_jacobian(boom: Boom, q: Array) -> Array:
-    """Return the Jacobian by (theta1, theta2, psi, theta4, theta5), whose values are q."""
+def position_jacobian(boom: Boom, q: ArrayLike) -> Array:
+    """Return the upper rows of `jacobian`, (..., 3, 5): v = J qd.
+
+    Raises:
+        InputError: q is not finite or not (..., 5).
+    """
+    q = checked("q", q, 5)
+    J = _linear_jacobian(boom, _with_actuator(boom, q))
+    return _by_joints(boom, q, np.moveaxis(J, (0, 1), (-2, -1)))
+
+
+def _linear_jacobian(boom: Boom, q: Array) -> Array:
+    """Return the upper rows of `_actuator_jacobian`, (3, 5, ...).
+
+    In memory, each entry of all states is one run of numbers.
+    """
     g = boom.geometry
     rho = g.L7 + q[..., 3]
-    c1, s1 = np.cos(q[..., 0]), np.sin(q[..., 0])
-    c2, s2 = np.cos(q[..., 1]), np.sin(q[..., 1])
-    c3, s3 = np.cos(q[..., 2]), np.sin(q[..., 2])
-    cp, sp = np.cos(q[..., 2] + q[..., 4]), np.sin(q[..., 2] + q[..., 4])
-    r, _ = _tip_in_plane(boom, q)
+    (c1, s1), (c2, s2), (c3, s3) = (cosine_and_sine(q[..., i]) for i in range(3))
+    cp, sp = cosine_and_sine(q[..., 2] + q[..., 4])
+    r = g.L2 + g.L9 * c2 - rho * c3 + g.L6 * s3 - g.L8 * sp
     dr = (-g.L9 * s2, rho * s3 + g.L6 * c3 - g.L8 * cp, -c3, -g.L8 * cp)
     dz = (g.L9 * c2, -rho * c3 + g.L6 * s3 - g.L8 * sp, -s3, -g.L8 * sp)
-    J = np.zeros((*r.shape, 6, 5))
-    J[..., 0, 0], J[..., 1, 0], J[..., 5, 0] = -s1 * r, c1 * r, 1.0
+    J = np.empty((3, 5, *r.shape))
+    J[0, 0], J[1, 0], J[2, 0] = -s1 * r, c1 * r, 0.0
     for i in range(4):
-        J[..., 0, i + 1], J[..., 1, i + 1], J[..., 2, i + 1] = c1 * dr[i], s1 * dr[i], dz[i]
-    for turning in (2, 4):
-        J[..., 3, turning], J[..., 4, turning] = s1, -c1
+        J[0, i + 1], J[1, i + 1], J[2, i + 1] = c1 * dr[i], s1 * dr[i], dz[i]
     return J
+
+
+def _actuator_jacobian(boom: Boom, q: Array) -> Array:
+    """Return the Jacobian by (theta1, theta2, psi, theta4, theta5), whose values are q."""
+    c1, s1 = cosine_and_sine(q[..., 0])
+    J = np.zeros((6, 5, *c1.shape))
+    J[:3] = _linear_jacobian(boom, q)
+    J[5, 0] = 1.0
+    for turning in (2, 4):
+        J[3, turning], J[4, turning] = s1, -c1
+    return np.moveaxis(J, (0, 1), (-2, -1))
 
 
 def jacobian_rate(boom: Boom, q: ArrayLike, qd: ArrayLike) -> Array:
@@ -170,7 +192,8 @@ def transmission_angle(q: ArrayLike) -> Array:
         InputError: q is not finite or not (..., 5).
     """
     q = checked("q", q, 5)
-    angle: Array = np.arcsin(np.abs(np.sin(q[..., 2] - q[..., 1])))
+    _, sine = cosine_and_sine(q[..., 2] - q[..., 1])
+    angle: Array = np.arcsin(np.minimum(np.abs(sine), 1.0))
     return angle
 
 

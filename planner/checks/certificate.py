@@ -49,10 +49,11 @@ def certify(
         evaluated: evaluation of the same motions on the same base, if there is one. Its states
             are reused.
     """
-    states = _states(boom, motions, base, evaluated)
-    worst = worst_of(boom, motions, states, average_torque)
+    parts = _states(boom, motions, base, evaluated)
+    worst = worst_of(boom, motions, parts, average_torque)
     laws = [motion.law for motion in motions]
-    return Certificate(len(states.t), worst, sum(law.iterations for law in laws), max(law.residual for law in laws))
+    samples = sum(len(part.t) for part in parts)
+    return Certificate(samples, worst, sum(law.iterations for law in laws), max(law.residual for law in laws))
 
 
 def certificate_of(evaluation: Evaluation) -> Certificate | None:
@@ -64,20 +65,17 @@ def certificate_of(evaluation: Evaluation) -> Certificate | None:
     return certify(evaluation.boom, planned.motions, evaluation.vehicle.tilt, planned.average_torque, seen)
 
 
-def _states(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None, evaluated: Evaluation | None) -> States:
-    """Return the states to certify, in order of time.
+def _states(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None, evaluated: Evaluation | None) -> list[States]:
+    """Return the states to certify, in parts in order of time.
 
     These are the evaluation's states, the states on both sides of every jump, and as many more as
     each part needs for LEAST_SAMPLES.
     """
     if evaluated is None:
-        return states_of(boom, motions, base, [0] * len(motions))
+        return [states_of(boom, motions, base, [0] * len(motions))]
     starts = np.cumsum([0.0, *(motion.duration for motion in motions)])
     edges = np.searchsorted(evaluated.t, starts)
     edges[-1] = len(evaluated.t)
     more = states_of(boom, motions, base, np.diff(edges).tolist())
     motion = evaluated.trajectory
-    known = np.zeros_like(motion.q) if motion.qddd is None else motion.qddd
-    order = np.argsort(np.concatenate([motion.t, more.t]), kind="stable")
-    seen = (motion.t, motion.q, motion.qd, motion.qdd, known, evaluated.tau)
-    return States(*(np.concatenate(pair)[order] for pair in zip(seen, more, strict=True)))
+    return [States(motion.t, motion.q, motion.qd, motion.qdd, motion.qddd, evaluated.tau), more]

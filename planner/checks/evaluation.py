@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from boom_model import BaseMotion, Basis, Boom, InputError, Loads, inverse_dynamics, mass_matrix
+from boom_model import BaseMotion, Basis, Boom, InputError, Loads, gravity_torque, inverse_dynamics, mass_matrix
 from boom_model.arrays import Array
 from boom_model.dynamics.newton_euler import PayloadAs
 from planner.checks.drives.joint_view import Shock
@@ -46,10 +46,8 @@ class Evaluation:
     @cached_property
     def static(self) -> Array:
         """Static torque (n, 5) at each pose on the tilted base, without friction."""
-        still = np.zeros(5)
         tilt = None if self.base is None else BaseMotion.of(up=self.base.up)
-        q = self.trajectory.q
-        return inverse_dynamics(self.boom, q, still, still, base=tilt, payload_as=self.payload_as, reactions=False).tau
+        return gravity_torque(self.boom, self.trajectory.q, base=tilt)
 
     @cached_property
     def inertia(self) -> Array:

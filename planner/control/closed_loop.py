@@ -327,8 +327,9 @@ def simulate(
         motor, motor_d = _measured(q, theta, E), _measured(qd, theta_d, E)
         off = np.abs(motor - table.q[i][row])
         fallen = alive & (~np.isfinite(x).all(axis=1) | (off > DIVERGED).any(axis=1))
-        ended[fallen], alive[fallen] = k * T, False
-        x[fallen, 5:10], x[fallen, 10 + m :] = 0.0, 0.0
+        if fallen.any():
+            ended[fallen], alive[fallen] = k * T, False
+            x[fallen, 5:10], x[fallen, 10 + m :] = 0.0, 0.0
         if pulled is not None:
             slipped = (teeth * off[pulled] > np.pi) & np.isnan(lost[pulled])
             lost[pulled] = np.where(slipped, k * T, lost[pulled])

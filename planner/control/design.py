@@ -223,7 +223,7 @@ def analyse(plant: Plant, gains: Gains, q: Array, *, model: Plant | None = None,
     if not responses:
         return Loop(q, continuous[order], largest, (), np.zeros(0), np.zeros((0, 5)))
     f = np.geomspace(0.02, 0.4999 / T, 2000)
-    P, C = (np.moveaxis(_response(s, f), -1, 0) for s in (sampled, law))
+    P, C = (_response(s, f) for s in (sampled, law))
     L = C @ P
     each = np.stack([_joint_loop(L, i) for i in range(5)], axis=-1)
     margins = tuple(_margins(i, f, each[:, i]) for i in range(5))
@@ -252,7 +252,13 @@ def _law(plant: Plant, gains: Gains, q: Array, T: float) -> Any:
 
 
 def _response(system: Any, f: Array) -> Any:
-    return system(np.exp(2j * np.pi * f * system.dt), squeeze=False)
+    """Return C (z - A)^-1 B + D (k, 5, 5) on the unit circle.
+
+    python-control solves for one frequency at a time.
+    """
+    z = np.exp(2j * np.pi * f * system.dt)[:, None, None]
+    states = np.linalg.solve(z * np.eye(len(system.A)) - system.A, np.broadcast_to(system.B, (len(f), *system.B.shape)))
+    return system.C @ states + system.D
 
 
 def _joint_loop(L: Any, i: int) -> Any:

@@ -3,7 +3,7 @@
 import os
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,7 +78,8 @@ class Trajectory:
             at = int(np.argmax(np.diff(t) <= 0)) + 1
             raise InputError(f"t[{at}] = {t[at]:g} s does not come after t[{at - 1}] = {t[at - 1]:g} s; times must increase")
         arrays = {"q": q, "qd": qd, "qdd": qdd} | ({} if qddd is None else {"qddd": qddd})
-        ready = {name: read_only(checked(name, values, 5)) for name, values in arrays.items()}
+        # A joint is one run of numbers in memory: NumPy is slow on many rows of five.
+        ready = {name: read_only(checked(name, values, 5), order="F") for name, values in arrays.items()}
         for name, array in ready.items():
             if array.shape != (t.size, 5):
                 raise InputError(f"{name} has shape {array.shape}; with {t.size} times it must be ({t.size}, 5)")
@@ -121,6 +122,8 @@ def concatenate(parts: Sequence[Trajectory], notes: tuple[str, ...] = ()) -> Tra
 
     The sample that two neighbours share is kept once.
     """
+    if len(parts) == 1:
+        return replace(parts[0], notes=notes)
     starts = np.concatenate([[0.0], np.cumsum([part.t[-1] for part in parts])])
     kept = [slice(None), *[slice(1, None)] * (len(parts) - 1)]
     t = np.concatenate([part.t[k] + start for part, k, start in zip(parts, kept, starts[:-1], strict=True)])

@@ -41,12 +41,12 @@ class JointLine:
 
     def __call__(self, s: ArrayLike, order: int = 0) -> Array:
         """Return the derivative of the given order in s, shape (..., 5) for s (...)."""
-        s = np.asarray(s, dtype=float)[..., None]
-        if order == 0:
-            line: Array = (1.0 - s) * self.start + s * self.goal  # exact at both ends
-            return line
+        s = np.asarray(s, dtype=float)
+        if order == 0:  # exact at both ends
+            line = np.multiply.outer(self.start, 1.0 - s) + np.multiply.outer(self.goal, s)
+            return np.moveaxis(line, 0, -1)
         slope = self.goal - self.start if order == 1 else np.zeros(5)
-        return np.broadcast_to(slope, (*s.shape[:-1], 5))
+        return np.broadcast_to(slope, (*s.shape, 5))
 
     @property
     def knots(self) -> Array:

@@ -5,7 +5,6 @@ from typing import Any, Literal
 
 import numpy as np
 import rerun as rr
-from scipy.spatial.transform import Rotation
 
 from boom_model import Boom, body_transforms
 from boom_model.arrays import Array
@@ -13,6 +12,7 @@ from boom_model.keep_out import Box, KeepOut
 from boom_model.kinematics.frames import R_LINK_BODY
 from planner.motion.vehicle import VehicleCase, base_pose
 from planner.recording.palette import COLORS, DARK, LIGHT, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, PIN_COLOR, Color
+from planner.recording.quaternions import quaternions
 from planner.recording.solids import PIN_LENGTH, PIN_RADIUS, Bar, corners, payload_radius, pins
 from planner.recording.solids import bars as bars_of
 from planner.recording.stream import time_column
@@ -82,7 +82,7 @@ def log_motion(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, pl
 def _log_poses(recording: rr.RecordingStream, entity: str, T: Array, parent: str, child: str, t: Array) -> None:
     motion = rr.Transform3D.columns(
         translation=T[:, :3, 3],
-        quaternion=Rotation.from_matrix(T[:, :3, :3]).as_quat(),
+        quaternion=quaternions(T[:, :3, :3]),
         parent_frame=[parent] * len(t),
         child_frame=[child] * len(t),
     )
@@ -187,13 +187,15 @@ def log_vehicle(recording: rr.RecordingStream, ground: float, label: str) -> Non
     recording.log("world/vehicle", body, rr.CoordinateFrame("mount"), static=True)
     radius = 0.5
     at = [(x, y, ground + radius) for x in (low[0] + radius, high[0] - radius) for y in (low[1], high[1])]
-    along = Rotation.from_euler("x", 90.0, degrees=True).as_quat()
+    along = np.sqrt([0.5, 0.0, 0.0, 0.5])  # a quarter turn about x
     wheels = rr.Cylinders3D(centers=at, lengths=0.3, radii=radius, quaternions=[along] * 4, colors=PIN_COLOR, fill_mode="solid")
     recording.log("world/vehicle/wheels", wheels, rr.CoordinateFrame("mount"), static=True)
 
 
 def _log_keep_out(recording: rr.RecordingStream, keep_out: KeepOut) -> None:
     """Log the keep-out shapes, fixed to the mount."""
+    from scipy.spatial.transform import Rotation  # slow to import, and few booms have such shapes
+
     look: dict[str, Any] = {"colors": [OUTSIDE_COLOR], "fill_mode": "majorwireframe"}
     for shape in keep_out.shapes:
         entity = rr.new_entity_path(["world", "keep_out", shape.name])

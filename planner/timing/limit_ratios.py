@@ -49,8 +49,11 @@ def limit_ratios(boom: Boom, q: Array, qd: Array, qdd: Array, qddd: Array | None
     away = np.abs(q - middle)
     gap, linkage = q[:, 2] - q[:, 1], np.zeros_like(q)
     linkage[:, 2] = np.divide(limits.linkage, gap, out=np.full_like(gap, np.inf), where=gap > 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        apart = away / half
+    apart[(away == 0.0) & (half == 0.0)] = 0.0
     ratios = {
-        Limit.POSITION: np.divide(away, half, out=np.where(away > 0.0, np.inf, 0.0), where=half > 0.0),
+        Limit.POSITION: apart,
         Limit.LINKAGE: linkage,
         **rate_ratios(boom, qd, qdd, qddd),
     }

@@ -86,6 +86,8 @@ class PathDynamics:
         use the x of the point next to them. Where that is 0, the largest x that the velocity limits
         allow replaces it.
         """
+        if not self.viscous.any():
+            return self.coulomb, np.zeros_like(self.coulomb)
         largest = np.minimum(self.x_max, _FINITE)
         x = np.concatenate([x[1:2], x[1:-1], x[-2:-1]])
         root = np.sqrt(np.where(x > 0.0, np.clip(x, _LEAST_SHARE * largest, None), largest))[:, None]
@@ -116,6 +118,9 @@ def motor_ratio(boom: Boom, tau: Array, qd: Array, qdd: Array) -> Array:
     """
     limits = motor_limits(boom, qd)
     driven = np.abs(tau + rotors(boom) * qdd)
+    if (limits > 0.0).all():
+        ratio: Array = driven / limits
+        return ratio
     return np.divide(driven, limits, out=np.full_like(driven, np.inf), where=limits > 0.0)
 
 
@@ -158,12 +163,18 @@ def demand_ratios(boom: Boom, path: Path, law: TimeLaw, t: Array, base: BaseMoti
 
     They are those of a law at times t (n,).
     """
-    s, v, u = (np.asarray(law.s(t, order))[:, None] for order in range(3))
-    q, p1, p2 = (path(np.clip(s[:, 0], 0.0, 1.0), order) for order in range(3))
-    qd, qdd = p1 * v, p1 * u + p2 * v**2
+    q, p1, qd, qdd = _along(path, law, t)
     tau = inverse_dynamics(boom, q, qd, qdd, base=base, reactions=False).tau
     drives = _drive_ratio(boom, tau, qd, qdd, boom.friction.dry(np.sign(p1)))
     return (np.abs(qdd) / boom.limits.acceleration).max(axis=1), drives.max(axis=1)
+
+
+def _along(path: Path, law: TimeLaw, t: Array) -> tuple[Array, Array, Array, Array]:
+    """Return q, p', qd and qdd (n, 5) of a law at times t (n,), joint by joint in memory."""
+    s, v, u = law.s.derivatives(t, 2)
+    s = np.clip(s, 0.0, 1.0)
+    q, p1, p2 = (path(s, order).T for order in range(3))
+    return q.T, p1.T, (p1 * v).T, (p1 * u + p2 * v**2).T
 
 
 def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None = None, samples: int = _LOOKS) -> float:
@@ -174,10 +185,7 @@ def least_stretch(boom: Boom, path: Path, law: TimeLaw, base: BaseMotion | None 
     a larger k, which is found as a root. If a drive cannot even hold the static load somewhere,
     slowing does not help, and the result is k for the joint limits.
     """
-    t = Motion(path, law).times(samples)
-    s, v, u = (np.asarray(law.s(t, order))[:, None] for order in range(3))
-    q, p1, p2 = (path(np.clip(s[:, 0], 0.0, 1.0), order) for order in range(3))
-    qd, qdd = p1 * v, p1 * u + p2 * v**2
+    q, p1, qd, qdd = _along(path, law, Motion(path, law).times(samples))
     least = _joint_stretch(boom, qd, qdd)
     if not limited_by_drives(boom):
         return least
@@ -214,7 +222,7 @@ class PathLoads:
 
     def stretch(self, law: TimeLaw, t: Array, floor: float) -> float:
         """Return the smallest factor >= `floor` with which a law respects the limits at t (n,)."""
-        s, v, u = (np.asarray(law.s(t, order)) for order in range(3))
+        s, v, u = law.s.derivatives(t, 2)
         s, v, u = np.clip(s, 0.0, 1.0), v[:, None], u[:, None]
         p1 = self.path(s, 1)
         qd, qdd = p1 * v, p1 * u + self.path(s, 2) * v**2
@@ -274,7 +282,7 @@ def peak_rate_ratios(boom: Boom, motion: Motion, t: Array) -> tuple[float, float
     """Return the largest ratios of joint velocity, acceleration, jerk to their limits at t (n,)."""
     limits = boom.limits
     if isinstance(motion.path, JointLine):  # the largest rates of the law decide
-        peaks = (float(np.abs(motion.law.s(t, order)).max()) for order in (1, 2, 3))
+        peaks = (float(np.abs(rate).max()) for rate in motion.law.s.derivatives(t, 3)[1:])
         velocity, acceleration, jerk = (peak / limit for peak, limit in zip(peaks, path_limits(boom, motion.path), strict=True))
         return velocity, acceleration, jerk
     _, *rates = motion(t)

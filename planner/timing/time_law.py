@@ -2,16 +2,13 @@
 
 from dataclasses import dataclass, replace
 from math import comb, factorial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array
 from planner.paths.path import Path
-
-if TYPE_CHECKING:
-    from scipy.interpolate import PPoly
+from planner.timing.polynomials import Polynomials
 
 _BESIDE = 1e-9  # of the duration; distance from a knot of the path of the times on either side of it
 _BETWEEN = 32  # smallest number of steps between two knots of the path
@@ -22,7 +19,7 @@ _LEFT_OF = 1e-12  # of a piece; distance from its end of the last time in it
 class TimeLaw:
     """Piecewise polynomial s(t) from 0 to 1, from rest to rest."""
 
-    s: "PPoly"
+    s: Polynomials
     jerk_limited: bool = False
     """Whether the acceleration is continuous and the jerk respects a limit."""
     iterations: int = 1
@@ -38,7 +35,7 @@ class TimeLaw:
     def stretched(self, factor: float) -> "TimeLaw":
         """Return the law with its duration multiplied by `factor`: s(t / factor)."""
         powers = np.arange(len(self.s.c) - 1, -1, -1.0)[:, None]
-        return replace(self, s=type(self.s)(self.s.c / factor**powers, self.s.x * factor))
+        return replace(self, s=Polynomials(self.s.c / factor**powers, self.s.x * factor))
 
     def times(self, each: int) -> Array:
         """Return `each` equally spaced times in every piece.
@@ -53,7 +50,7 @@ class TimeLaw:
     def after(self, at: float) -> "TimeLaw":
         """Return the rest of the law from the time `at` on."""
         breaks = np.append(at, self.s.x[self.s.x > at])
-        return replace(self, s=type(self.s)(self.on(breaks), breaks - at))
+        return replace(self, s=Polynomials(self.on(breaks), breaks - at))
 
     def on(self, breaks: Array) -> Array:
         """Return the coefficients (powers, pieces) of the law between other breaks.
@@ -86,13 +83,14 @@ class TimeLaw:
             at = middle - shift
             inside = np.clip(at, 0.0, self.duration)
             running = (at > 0.0) & (at < self.duration)
-            taylor = np.array([np.where(running, integral(inside, k), 0.0) / factorial(k) for k in range(order)])
+            values = integral.derivatives(inside, order - 1)
+            taylor = np.array([np.where(running, value, 0.0) / factorial(k) for k, value in enumerate(values)])
             after = at >= self.duration
             taylor[0] += np.where(after, float(integral(self.duration)) + at - self.duration, 0.0)
             taylor[1] += after
             coefficients += sign / width * taylor[::-1]
         pieces = _moved(coefficients, -step / 2.0)
-        return replace(self, s=type(self.s)(pieces, breaks), jerk_limited=True)
+        return replace(self, s=Polynomials(pieces, breaks), jerk_limited=True)
 
     @staticmethod
     def from_pieces(durations: ArrayLike, coefficients: ArrayLike, jerk_limited: bool = False) -> "TimeLaw":
@@ -105,12 +103,10 @@ class TimeLaw:
             coefficients: (powers, pieces), highest power first.
             jerk_limited: see the field.
         """
-        from scipy.interpolate import PPoly  # slow to import, and `boom ik` does not need it
-
         durations, coefficients = np.asarray(durations, dtype=float), np.asarray(coefficients, dtype=float)
         kept = durations > 0.0
         breaks = np.concatenate([[0.0], np.cumsum(durations[kept])])
-        return TimeLaw(PPoly(coefficients[:, kept], breaks), jerk_limited)
+        return TimeLaw(Polynomials(coefficients[:, kept], breaks), jerk_limited)
 
 
 def _moved(coefficients: Array, by: Array) -> Array:
@@ -142,7 +138,7 @@ class Motion:
         times between any two knots.
         """
         t = self.law.times(max(3, -(-samples // (len(self.law.s.x) - 1))))
-        passed = [self.law.s.solve(knot, extrapolate=False) for knot in self.path.knots]
+        passed = [self.law.s.solve(knot) for knot in self.path.knots]
         if not passed:
             return t
         at = np.concatenate(passed)
@@ -159,8 +155,10 @@ class Motion:
         Times outside the motion are clipped to it.
         """
         inside = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
-        s, v, a, j = (np.asarray(self.law.s(inside, order)) for order in range(4))
+        s, v, a, j = self.law.s.derivatives(inside, 3)
         s, v = np.clip(s, 0.0, 1.0), np.maximum(v, 0.0)  # s never decreases except by rounding, which would reverse friction
-        p = [self.path(s, order) for order in range(4)]
-        v, a, j = v[..., None], a[..., None], j[..., None]
-        return p[0], p[1] * v, p[2] * v**2 + p[1] * a, p[3] * v**3 + 3.0 * p[2] * v * a + p[1] * j
+        # A joint is one run of numbers in memory: NumPy is slow on many rows of five.
+        p0, p1, p2, p3 = (np.moveaxis(self.path(s, order), -1, 0) for order in range(4))
+        states = p0, p1 * v, p2 * v**2 + p1 * a, p3 * v**3 + 3.0 * p2 * v * a + p1 * j
+        q, qd, qdd, qddd = (np.moveaxis(x, 0, -1) for x in states)
+        return q, qd, qdd, qddd

@@ -40,7 +40,8 @@ class States(NamedTuple):
     q: Array
     qd: Array
     qdd: Array
-    qddd: Array
+    qddd: Array | None
+    """None unless a motion limits the jerk."""
     tau: Array
 
 
@@ -62,25 +63,37 @@ def states_of(boom: Boom, motions: Sequence[Motion], base: BaseMotion | None, se
     return States(t, q, qd, qdd, qddd, tau)
 
 
-def worst_of(boom: Boom, motions: Sequence[Motion], states: States, average_torque: bool) -> tuple[WorstRatio, ...]:
-    """Return the worst ratio of states to each limit.
+def worst_of(boom: Boom, motions: Sequence[Motion], parts: Sequence[States], average_torque: bool) -> tuple[WorstRatio, ...]:
+    """Return the worst ratio to each limit over all parts, the first of equal ones.
 
     The jerk is included if every motion limits it.
 
     Args:
         boom: the boom.
         motions: the motions of the states.
-        states: see `states_of`.
+        parts: states in order of time, as from `states_of`.
         average_torque: whether to include the average torque of the gearboxes.
     """
-    jerk = states.qddd if all(motion.law.jerk_limited for motion in motions) else None
-    worst = []
-    for limit, ratio in limit_ratios(boom, states.q, states.qd, states.qdd, jerk, states.tau).items():
-        at, joint = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
-        worst.append(WorstRatio(limit, JOINTS[joint], float(ratio[at, joint]), float(states.t[at])))
-    if average_torque:
-        worst += _averages(boom, states)
-    return tuple(worst)
+    jerk_limited, worst = all(motion.law.jerk_limited for motion in motions), dict[Limit, WorstRatio]()
+    for states in parts:
+        jerk = states.qddd if jerk_limited else None
+        for limit, ratio in limit_ratios(boom, states.q, states.qd, states.qdd, jerk, states.tau).items():
+            found = _largest(limit, states.t, ratio)
+            if limit not in worst or _order(found) > _order(worst[limit]):
+                worst[limit] = found
+    averages = _averages(boom, parts) if average_torque else []
+    return (*(worst[limit] for limit in Limit if limit in worst), *averages)
+
+
+def _largest(limit: Limit, t: Array, ratio: Array) -> WorstRatio:
+    """Return the largest of the ratios (n, 5) at times t (n,), the first of equal ones."""
+    at = ratio.argmax(axis=0).tolist()
+    joint = min(range(len(at)), key=lambda i: (-ratio[at[i], i], at[i]))
+    return WorstRatio(limit, JOINTS[joint], float(ratio[at[joint], joint]), float(t[at[joint]]))
+
+
+def _order(worst: WorstRatio) -> tuple[float, float]:
+    return worst.ratio, -(worst.at_s or 0.0)
 
 
 def worst_ratios(
@@ -91,7 +104,7 @@ def worst_ratios(
     Torques include friction. If the supply of a motor is unknown, its torque is compared with the
     limit at standstill, and the limit is named accordingly.
     """
-    return worst_of(boom, motions, states_of(boom, motions, base, [0] * len(motions)), average_torque)
+    return worst_of(boom, motions, [states_of(boom, motions, base, [0] * len(motions))], average_torque)
 
 
 def joint_stretch(boom: Boom, motion: Motion) -> float:
@@ -104,12 +117,13 @@ def joint_stretch(boom: Boom, motion: Motion) -> float:
     return float(max(velocity, np.sqrt(acceleration), np.cbrt(jerk) if motion.law.jerk_limited else 0.0))
 
 
-def _averages(boom: Boom, states: States) -> list[WorstRatio]:
+def _averages(boom: Boom, parts: Sequence[States]) -> list[WorstRatio]:
     """Return the largest ratio of a gearbox to its average torque limit."""
-    ratios = []
+    t, tau, qd = (np.concatenate(each) for each in zip(*((part.t, part.tau, part.qd) for part in parts), strict=True))
+    order, ratios = np.argsort(t, kind="stable"), []
     for i, drive in enumerate(boom.drives):
         limit = None if drive is None else drive.gearbox.max_average_torque
         if limit is not None:
-            share = (mean(states.t, states.tau[:, i], states.qd[:, i]) or 0.0) / limit
+            share = (mean(t[order], tau[order, i], qd[order, i]) or 0.0) / limit
             ratios.append(WorstRatio(Limit.AVERAGE_TORQUE, JOINTS[i], share, None))
     return [max(ratios, key=lambda each: each.ratio)] if ratios else []

@@ -20,9 +20,11 @@ def cpu_seconds(*arguments: str, where: Path) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def test_a_plan_takes_under_five_imports_of_rerun(tmp_path: Path):
-    """2.9, or 3.0 to 3.9 where pandas is installed, which pyarrow then imports; the move itself is
-    a tenth of it."""
+def test_a_plan_takes_about_three_imports_of_rerun(tmp_path: Path):
+    """2.1, or 2.8 where pandas is installed, which pyarrow then imports.
+
+    The move itself is a tenth of it.
+    """
     processes = {"rerun": ("-c", "import rerun"), "plan": ("-m", "planner", "plan", "transport", "phenotyping")}
     spent = {name: [] for name in processes}
     for _ in range(ROUNDS):
@@ -30,14 +32,14 @@ def test_a_plan_takes_under_five_imports_of_rerun(tmp_path: Path):
             spent[name].append(cpu_seconds(*arguments, where=tmp_path))
     ratio = min(spent["plan"]) / min(spent["rerun"])
     print(f"boom plan takes {ratio:.2f} of `import rerun`")
-    assert ratio < 5.0
+    assert ratio < 3.3
 
 
-def test_a_plan_imports_neither_pictures_nor_control(tmp_path: Path):
+def test_a_plan_imports_neither_pictures_nor_control_nor_scipy(tmp_path: Path):
     code = (
         "import sys; from planner.cli import cli\n"
         "cli.main(['plan', 'transport', 'phenotyping'], standalone_mode=False)\n"
-        "print(sorted({'control', 'matplotlib', 'scipy.signal', 'toppra'} & set(sys.modules)))"
+        "print(sorted({'control', 'matplotlib', 'scipy', 'toppra'} & set(sys.modules)))"
     )
     environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
     done = subprocess.run(

@@ -38,8 +38,8 @@ BOOM = Boom.load()
 PATH = JointLine(BOOM.pose("transport"), BOOM.pose("phenotyping"))
 ROUNDS = 9  # of both in turn, of which the best counts
 PEER_SAMPLES = 5_001
-MOST = {"time-optimal": 0.5, "jerk-limited": 1.0, "jerk bound": 2.5}
-"""Share of the peer's time that a motion may take, checks not counted; 0.45, 0.28 and 2.2 were
+MOST = {"time-optimal": 0.48, "jerk-limited": 0.25, "jerk bound": 2.3}
+"""Share of the peer's time that a motion may take, checks not counted; 0.40, 0.20 and 1.9 were
 seen."""
 TIMINGS = {
     "time-optimal": Timing.of("time-optimal"),
@@ -125,7 +125,7 @@ def test_time(benchmark, name, method):
 
 @pytest.mark.parametrize("name", BOOMS)
 def test_planning_takes_no_longer_than_the_peers_and_keeps_what_that_breaks(name):
-    """0.37 to 0.74 of the peer's time were seen."""
+    """0.33 to 0.64 of the peer's time were seen."""
     boom, best, planned = BOOMS[name], dict.fromkeys(METHODS, np.inf), {}
     for _ in range(ROUNDS):
         for method in METHODS:
@@ -142,19 +142,19 @@ def test_planning_takes_no_longer_than_the_peers_and_keeps_what_that_breaks(name
     assert kept[peers]["motor at standstill"] <= 1.001
     if boom is not BOOM:
         assert kept[peers]["motor on its curve"] > 1.5
-    assert best[ours] < best[peers]
+    assert best[ours] < 0.8 * best[peers]
 
 
 WHOLE = {
-    "plan, time-optimal": (lambda: plan(BOOM, "transport", "phenotyping", profile="time-optimal"), 1.9),
-    "plan, jerk-limited": (lambda: plan(BOOM, "transport", "phenotyping", profile="jerk-limited"), 2.0),
+    "plan, time-optimal": (lambda: plan(BOOM, "transport", "phenotyping", profile="time-optimal"), 1.05),
+    "plan, jerk-limited": (lambda: plan(BOOM, "transport", "phenotyping", profile="jerk-limited"), 0.85),
     "plan, time-optimal with jerk bound": (
         lambda: plan(BOOM, "transport", "phenotyping", profile=TimeOptimal(jerk_bound=True)),
-        20.0,
+        2.9,
     ),
     "plan_motion, time-optimal": (
         lambda: plan_motion(BOOM, MoveSpec.of("transport", "phenotyping", profile="time-optimal")),
-        0.75,
+        0.48,
     ),
 }
 """What a user calls, certificate and checks included, and the most of the peer's time that it may
@@ -162,7 +162,7 @@ take."""
 
 
 def test_a_whole_plan_takes_few_times_as_long_as_the_peers_law_alone():
-    """Seen: 1.31, 1.40, 13.8 and 0.53 of the peer's time; a tenth more on a busy machine."""
+    """0.85 to 0.95, 0.7, 2.4 and 0.4 of the peer's time were seen."""
     jobs = {"peer": (peers(BOOM), 1.0), **WHOLE}
     best = dict.fromkeys(jobs, np.inf)
     for _ in range(ROUNDS):

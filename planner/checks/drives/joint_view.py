@@ -101,4 +101,5 @@ class JointView:
 
     def _weakened(self, origin: Origin) -> Origin:
         """Return the origin with the weaker of its own basis and that of the torques."""
-        return replace(origin, basis=Basis.weakest([origin.basis, self.basis]))
+        basis = Basis.weakest((origin.basis, self.basis))
+        return origin if basis is origin.basis else replace(origin, basis=basis)

@@ -1,6 +1,7 @@
 """Checks of a hybrid stepper motor and its gearbox against the motor's datasheet."""
 
 from collections.abc import Iterator
+from functools import reduce
 
 import numpy as np
 
@@ -49,6 +50,7 @@ def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     directions = [(CheckKind.MOTOR_TORQUE, view.tau, view.qd)]
     if view.steady:  # in the reversed motion only friction changes its sign
         directions.append((CheckKind.MOTOR_TORQUE_REVERSED, view.tau - 2.0 * view.friction, -view.qd))
+    curve = available_torque(drive, drive.gearbox.ratio * np.abs(view.qd))
     demands, other = [], []
     for kind, tau, qd in directions:
         torque = motor_torque(drive, tau, qd, view.qdd)
@@ -58,15 +60,15 @@ def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
         demands.append(np.abs(torque))
         less = motor_torque(drive, tau, qd, view.qdd, no_load_in_efficiency=True)
         other += [] if less is None else [np.abs(less)]
-        yield _motor_torque_row(view, drive, kind, demands[-1])
+        yield _motor_torque_row(view, drive, kind, demands[-1], curve)
     yield _quasi_static_row(view, drive)
     if other:
-        yield _other_reading_row(view, drive, np.max(other, axis=0))
-    yield _motor_speed_row(view, drive, np.max(demands, axis=0))
+        yield _other_reading_row(view, drive, reduce(np.maximum, other), curve)
+    yield _motor_speed_row(view, drive, reduce(np.maximum, demands))
     braked = drive.brake is not None and drive.brake.value  # a motor without a brake stays on in a pause
     driven = np.where(view.duty.powered, demands[0], 0.0) if braked else demands[0]
     known = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; a stepper's heat depends on its current, not on its torque")
-    yield view.informative(CheckKind.MOTOR_RMS_TORQUE, figure=view.duty.mean(driven**2) ** 0.5, origin=known)
+    yield view.informative(CheckKind.MOTOR_RMS_TORQUE, figure=view.duty.mean(driven * driven) ** 0.5, origin=known)
 
 
 def _unknown_torque_rows(view: JointView, drive: Drive, directions: list[CheckKind]) -> Iterator[Row]:
@@ -85,15 +87,14 @@ def _unknown_torque(drive: Drive) -> str:
     return f"{_sheet(drive.motor)}; {drive.gearbox.source}; efficiency, no-load torque or an inertia is not printed"
 
 
-def _motor_torque_row(view: JointView, drive: Drive, kind: CheckKind, torque: Array) -> Row:
+def _motor_torque_row(view: JointView, drive: Drive, kind: CheckKind, torque: Array, curve: Array | None) -> Row:
     """Return the row of the sample with the least margin.
 
-    The limit is the torque-speed curve, or the running torque at low speed.
+    The limit is the torque-speed curve at the samples, or the running torque at low speed.
     """
     motor = drive.motor
     speed = drive.gearbox.ratio * np.abs(view.qd)
     running = motor.running_torque
-    curve = available_torque(drive, speed)
     slow = Origin(Basis.PRINTED, f"{_sheet(motor)}, running torque")
     if running is None or (curve is None and (speed > LOW_SPEED).any()):
         most, at = view.peak(torque)
@@ -140,14 +141,13 @@ def _quasi_static_row(view: JointView, drive: Drive) -> Row:
     return view.compared(kind, demand=float(torque), limit=limit, at=at, origin=origin, warn_near=weak)
 
 
-def _other_reading_row(view: JointView, drive: Drive, torque: Array) -> Row:
+def _other_reading_row(view: JointView, drive: Drive, torque: Array, available: Array | None) -> Row:
     """Return the row of the other reading of the sheet's efficiency.
 
     In this reading the efficiency already includes the no-load torque. The row shows the sample
     with the least margin in either direction.
     """
     efficiency = mesh_efficiency(drive.gearbox)
-    available = available_torque(drive, drive.gearbox.ratio * np.abs(view.qd))
     at = int(np.argmax(torque)) if available is None else _least_margin(available, torque)
     origin = Origin(
         Basis.ESTIMATED,

@@ -169,13 +169,15 @@ def _time_scale(demands: PathDynamics) -> float:
 
 def _iterate(demands: PathDynamics, path: Path, x: Array, unit: float) -> _Found | None:
     """Return the law of the last solve, the first with tangents at x (n,); None if infeasible."""
-    found, rows = None, limit_rows(demands, x)
+    found, fixed = None, breakable_rows(limit_rows(demands, x, moving=False), demands)
+    rows = limit_rows(demands, x, moving=True)
     for solves in range(1, _SOLVES + 1):
-        solved = _solve(_Condition(breakable_rows(rows, demands), demands.x_max, unit), path, demands.s)
+        a, b, c = (np.hstack(pair) for pair in zip(fixed, breakable_rows(rows, demands), strict=True))
+        solved = _solve(_Condition((a, b, c), demands.x_max, unit), path, demands.s)
         if solved is None:
             break
         speed = solved / unit
-        old, rows = rows, limit_rows(demands, speed**2)
+        old, rows = rows, limit_rows(demands, speed**2, moving=True)
         found = _Found(speed, solves, _gain(demands.s, speed, old, rows))
         if found.gain <= _CONVERGED:
             break
@@ -203,34 +205,56 @@ def breakable_rows(rows: _Rows, demands: PathDynamics) -> _Rows:
     return a[:, kept], b[:, kept], c[:, kept]
 
 
-def limit_rows(demands: PathDynamics, x: Array) -> tuple[Array, Array, Array]:
-    """Return a u + b x + c <= 1 as arrays (n, m), the drives' curves by tangents at x (n,)."""
-    boom, zero = demands.boom, np.zeros_like(demands.s)
+def limit_rows(demands: PathDynamics, x: Array, *, moving: bool | None = None) -> _Rows:
+    """Return conditions a u + b x + c <= 1 as three arrays (n, m).
+
+    The drives' curves are taken at their tangents.
+
+    Args:
+        demands: the terms of the joint torques.
+        x: where the tangents touch, (n,).
+        moving: whether to return only the rows that change with the tangents, or only the others;
+            None is all.
+    """
+    boom = demands.boom
     at_rest, gears, inertias = motor_limits(boom, np.zeros(5)), gear_limits(boom), rotors(boom)
-    intercepts, slopes = demands.friction_tangent(x)
-    columns = []
+    intercepts, slopes = (part.T for part in demands.friction_tangent(x))
+    # Joint, sign, limit; share of the load, inertia, share of the friction.
+    kinds: list[tuple[int, float, float, float, float, float]] = []
+    curved = {}
     for i, drive in enumerate(boom.drives):
-        p1, p2, limit = demands.p1[:, i], demands.p2[:, i], boom.limits.acceleration[i]
-        for sign in (1.0, -1.0):
-            columns.append((sign * p1 / limit, sign * p2 / limit, zero))
+        if not moving:
+            kinds += [(i, sign, boom.limits.acceleration[i], 0.0, 1.0, 0.0) for sign in (1.0, -1.0)]
         if drive is None:
             continue
-        tangent = drive_torque_tangent(drive, p1 * np.sqrt(x))
-        torques = [(demands.b[:, i], demands.c[:, i])]
-        if intercepts[:, i].any():  # without friction as well: it earns no credit while braking
-            torques.append((demands.b[:, i] + slopes[:, i], demands.c[:, i] + intercepts[:, i]))
-        for sign, (carried, held) in product((1.0, -1.0), torques):
-            a, b, c = sign * demands.a[:, i], sign * carried, sign * held
-            if np.isfinite(gears[i]):
-                columns.append((a / gears[i], b / gears[i], c / gears[i]))
+        tangent = None if moving is False else drive_torque_tangent(drive, demands.p1[:, i] * np.sqrt(x))
+        # without friction as well: it earns no credit while braking
+        for sign, rubs in product((1.0, -1.0), (0.0, 1.0) if intercepts[i].any() else (0.0,)):
+            wanted = moving is None or moving == bool(rubs and slopes[i].any())
+            if np.isfinite(gears[i]) and wanted:
+                kinds.append((i, sign, gears[i], 1.0, 0.0, rubs))
             if np.isfinite(at_rest[i]):
-                a, b = a + sign * inertias[i] * p1, b + sign * inertias[i] * p2
-                columns.append((a / at_rest[i], b / at_rest[i], c / at_rest[i]))
+                motor = (i, sign, at_rest[i], 1.0, inertias[i], rubs)
+                if wanted:
+                    kinds.append(motor)
                 if tangent is not None:
-                    intercept, slope = tangent[0], tangent[1] * p1**2
-                    columns.append((a / at_rest[i], (b - slope) / at_rest[i], (c - intercept) / at_rest[i] + 1.0))
-    a, b, c = (np.stack(part, axis=-1) for part in zip(*columns, strict=True))
-    return a, b, c
+                    curved[len(kinds)] = tangent
+                    kinds.append(motor)
+    if not kinds:
+        none = np.empty((len(x), 0))
+        return none, none, none
+    joint = [i for i, *_ in kinds]
+    sign, limit, loaded, inertia, rubs = np.array([rest for _, *rest in kinds]).T[:, :, None]
+    p1, p2 = demands.p1.T[joint], demands.p2.T[joint]
+    a = sign * (loaded * demands.a.T[joint] + inertia * p1)
+    b = sign * (loaded * (demands.b.T[joint] + rubs * slopes[joint]) + inertia * p2)
+    c = sign * (loaded * (demands.c.T[joint] + rubs * intercepts[joint]))
+    for row, (intercept, slope) in curved.items():
+        b[row] -= slope * p1[row] ** 2
+        c[row] -= intercept
+    a, b, c = a / limit, b / limit, c / limit
+    c[list(curved)] += 1.0
+    return a.T, b.T, c.T
 
 
 def _solve(condition: "_Condition", path: Path, s: Array) -> Array | None:
