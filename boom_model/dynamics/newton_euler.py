@@ -14,7 +14,10 @@ Newton's and Euler's equations of a set of bodies ask no more of its masses than
 U = Q A, the force on the set is U_o, and its moment about any pin a sum of b_i x U_i. The equilibrium of tool, extension,
 upper, outer, inner and lower link gives the joint torques and the pin forces from these (eqs. 2.45-2.71).
 
-All this holds for a parallelogram. Where the links are unequal, `virtual_work` takes its place.
+Where opposite links are unequal, the upper link turns at psi and the outer one at chi (see `linkage`). Then psi stands in the
+place of theta3 above, and four vectors more are needed: el, pl of the lower link at theta3, and eo, po of the outer one at
+chi. The torque of theta2 is the sum of the torques at theta2, psi and chi, each times the derivative of its angle by theta2;
+that of theta3 likewise.
 """
 
 from collections.abc import Sequence
@@ -27,12 +30,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, broadcast, checked, read_only
-from boom_model.boom import Body, Boom
+from boom_model.boom import Body, Boom, Geometry
 from boom_model.drives.drive import reflected_inertia
 from boom_model.dynamics.base_motion import BaseMotion
-from boom_model.dynamics.virtual_work import balance
 from boom_model.errors import InputError
 from boom_model.kinematics.frames import R_LINK_BODY
+from boom_model.kinematics.linkage import Loop, Value, solved_loop
 
 PayloadAs = Literal["mass", "force"]
 
@@ -41,9 +44,10 @@ _CHUNK = 1280
 its products on one thread: a second one gains nothing on so thin a matrix, and waits for its turn
 on a busy machine."""
 
-_O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
+_O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT, _EL, _PL, _EO, _PO = range(15)
+"""The vectors b; the last four are those of a linkage of unequal links alone."""
 BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
-_LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
+_LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT), (_EL, _PL), (_EO, _PO))
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +55,8 @@ class PinForces:
     """Forces at the linkage's pins [N], each (..., 3) in frame 4: x forward, y to the left, z up, yawing with theta1.
 
     They lie in the arm's plane: how pins 7 and 8 share the load across it is statically indeterminate, so y is 0. They grow
-    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right: see `transmission_angle`.
+    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right, and as 1/sin(chi - psi) where
+    links are unequal: see `transmission_angle`.
     """
 
     frame_6: Array
@@ -132,18 +137,15 @@ def inverse_dynamics(
         np.zeros((3, count, 3)) if reactions else None,
         np.empty((count, 6)) if reactions else None,
     )
-    model = regrouped(boom, payload_as) if boom.geometry.is_parallelogram else None
+    model = regrouped(boom, payload_as)
     rotors = np.array([(drive and reflected_inertia(drive)) or 0.0 for drive in boom.drives]) if drive_inertia else None
 
     def fill(motion: list[Array], outside: list[Array], push: Array | None, twist: Array | None, out: _Outputs) -> None:
-        if model is None:
-            _by_virtual_work(boom, motion, outside, payload_as, [push, twist], out)
-        else:
-            state = _state(motion)
-            plane = _plane(boom, state, *map(_columns, outside))
-            force = None if push is None else _into_plane(state, _columns(push))
-            moment = None if twist is None else _into_plane(state, _columns(twist))
-            _newton_euler(model, state, plane, force, moment, out)
+        state = _state(motion)
+        plane = _plane(boom, state, *map(_columns, outside))
+        force = None if push is None else _into_plane(state, _columns(push))
+        moment = None if twist is None else _into_plane(state, _columns(twist))
+        _newton_euler(model, state, plane, force, moment, out)
         if friction:
             out.tau[:] += boom.friction.torque(motion[1])
         if rotors is not None:
@@ -186,32 +188,49 @@ def base_series(base: BaseMotion | None, shape: tuple[int, ...]) -> list[Array]:
 
 
 def element_accelerations(boom: Boom, q: Array, qd: Array, qdd: Array, *base: Array) -> Array:
-    """Return A (3, 11, n) of n states (n, 5) along x, z and n, on a base moved as `base_series` says."""
+    """Return A (3, m, n) of the m vectors b at n states (n, 5) along x, z and n, on a base moved as `base_series` says.
+
+    Raises:
+        InfeasibleError: a linkage of unequal links cannot close at q.
+    """
     state = _State(*(list(np.ascontiguousarray(x.T)) for x in (q, qd, qdd)))
-    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
     plane = _plane(boom, state, *(list(x.T) for x in base))
-    return np.asarray(_accelerations(state, plane, (c2, c3, ct), (s2, s3, st), boom.geometry.L7 + q[:, 3]))
+    links, _ = _turns(boom.geometry, state)
+    return np.asarray(_accelerations(state, plane, links, boom.geometry.L7 + q[:, 3]))
 
 
 def element_velocities(boom: Boom, q: Array) -> Array:
-    """Return db/dq (5, 3, 11, n) of every joint and vector b at n states (n, 5), along x, z and n.
+    """Return db/dq (5, 3, m, n) of every joint and vector b at n states (n, 5), along x, z and n.
 
     Yaw turns the plane about z: x goes to -n, n to x. An angle turns its links' e to p, and p to
     -e.
+
+    Raises:
+        InfeasibleError: a linkage of unequal links cannot close at q.
     """
-    (c2, s2), (c3, s3), (ct, st) = (_cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
-    rho = boom.geometry.L7 + q[:, 3]
-    moved = np.zeros((5, 3, 11, len(q)))
+    columns, still = list(np.ascontiguousarray(q.T)), [np.zeros(len(q))] * 5
+    links, loop = _turns(boom.geometry, _State(columns, still, still))
+    rho, (c3, s3) = boom.geometry.L7 + q[:, 3], (links[1].c, links[1].s)
+    by: tuple[dict[int, Value], ...]  # the joint's derivative of the angle of each link
+    if loop is None:
+        by = ({}, {0: 1.0}, {1: 1.0, 2: 1.0}, {}, {2: 1.0})
+    else:
+        (psi_2, psi_3), (chi_2, chi_3) = loop.upper_by, loop.outer_by
+        by = ({}, {0: 1.0, 1: psi_2, 2: psi_2, 4: chi_2}, {1: psi_3, 2: psi_3, 3: 1.0, 4: chi_3}, {}, {2: 1.0})
+    moved = np.zeros((5, 3, _count(boom.geometry), len(q)))
     moved[0, 0, _N] = 1.0
     moved[0, 2, _X] = -1.0
-    for joints, (e, p), c, s in (((1,), _LINKS[0], c2, s2), ((2,), _LINKS[1], c3, s3), ((2, 4), _LINKS[2], ct, st)):
-        moved[0, 2, e], moved[0, 2, p] = -c, s
-        for joint in joints:
-            moved[joint, 0, e], moved[joint, 1, e] = -s, c
-            moved[joint, 0, p], moved[joint, 1, p] = -c, -s
     moved[0, 2, _RHO] = -rho * c3
-    moved[2, 0, _RHO], moved[2, 1, _RHO] = -rho * s3, rho * c3
     moved[3, 0, _RHO], moved[3, 1, _RHO] = c3, s3
+    for i, ((e, p), link) in enumerate(zip(_LINKS, links, strict=False)):
+        moved[0, 2, e], moved[0, 2, p] = -link.c, link.s
+        for joint, turned in enumerate(by):
+            if i in turned:
+                along, across = turned[i] * link.c, turned[i] * link.s
+                moved[joint, 0, e], moved[joint, 1, e] = -across, along
+                moved[joint, 0, p], moved[joint, 1, p] = -along, -across
+                if i == 1:
+                    moved[joint, 0, _RHO], moved[joint, 1, _RHO] = -rho * across, rho * along
     return moved
 
 
@@ -220,14 +239,14 @@ class Regrouped(NamedTuple):
 
     boom: Boom
     rows: Array
-    """(17, 11): Q of all bodies; then Q of the outer link (o, e2, p2) and of all beyond pins 7 and
-    8 (o, e3, p3)."""
+    """(m + 6, m), of m vectors b: Q of all bodies; then Q of the outer link (o, e2, p2) and of all
+    beyond pins 7 and 8 (o, e3, p3)."""
     torque_rows: Array
-    """(11, 11): Q of all bodies alone."""
+    """(m, m): Q of all bodies alone."""
     tip: Array
-    """(11,) g of the tip."""
+    """(m,) g of the tip."""
     payload: Array
-    """(11,) g of the payload's centre of mass."""
+    """(m,) g of the payload's centre of mass."""
     hanging: float
     """Payload that is a force [kg]."""
 
@@ -238,10 +257,12 @@ def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
     elements = body_elements(boom)
     bodies = {**boom.bodies, "payload": boom.payload}
     Q = {name: elements[name].T @ _pseudo_inertia(body, R_LINK_BODY[name]) @ elements[name] for name, body in bodies.items()}
+    none = np.zeros((_count(boom.geometry), _count(boom.geometry)))
     if payload_as == "force":
-        Q["payload"] = np.zeros((11, 11))
-    top = sum((Q[name] for name in ("upper", "extension", "end_effector", "payload")), np.zeros((11, 11)))
-    rows = [sum(Q.values(), np.zeros((11, 11))), Q["outer"][[_O, _E2, _P2]], top[[_O, _E3, _P3]]]
+        Q["payload"] = none
+    top = sum((Q[name] for name in ("upper", "extension", "end_effector", "payload")), none)
+    outer = (_E2, _P2) if boom.geometry.is_parallelogram else (_EO, _PO)
+    rows = [sum(Q.values(), none), Q["outer"][[_O, *outer]], top[[_O, _E3, _P3]]]
     com = R_LINK_BODY["payload"] @ boom.payload.com
     return Regrouped(
         boom=boom,
@@ -254,23 +275,29 @@ def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
 
 
 def body_elements(boom: Boom) -> dict[str, Array]:
-    """Return g of each body's frame origin, and its change per metre along e, p and n, (4, 11)."""
-    g, unit = boom.geometry, np.eye(11)
+    """Return g of each body's frame origin, and its change per metre along e, p and n, (4, m)."""
+    g, unit = boom.geometry, np.eye(_count(boom.geometry))
+    lower, outer = ((_E3, _P3), (_E2, _P2)) if g.is_parallelogram else ((_EL, _PL), (_EO, _PO))
     shoulder = unit[_O] + g.L2 * unit[_X] + g.L1 * unit[_Z]
-    pin6 = shoulder + g.L3 * unit[_E3]
+    pin6 = shoulder + g.L3 * unit[lower[0]]
     pin8 = shoulder + g.L9 * unit[_E2]
     wrist = pin8 - g.L6 * unit[_P3] - unit[_RHO]
     placed = {
         "base": (unit[_O], _X, _Z),
-        "lower": (shoulder, _E3, _P3),
+        "lower": (shoulder, *lower),
         "inner": (shoulder, _E2, _P2),
-        "outer": (pin6, _E2, _P2),
+        "outer": (pin6, *outer),
         "upper": (pin8, _E3, _P3),
         "extension": (wrist, _E3, _P3),
         "end_effector": (wrist, _ET, _PT),
         "payload": (wrist + g.L8 * unit[_PT], _ET, _PT),
     }
     return {name: np.stack([origin, unit[e], unit[p], unit[_N]]) for name, (origin, e, p) in placed.items()}
+
+
+def _count(g: Geometry) -> int:
+    """Return m, the number of the vectors b."""
+    return 11 if g.is_parallelogram else 15
 
 
 def _pseudo_inertia(body: Body, R: Array) -> Array:
@@ -283,10 +310,6 @@ def _pseudo_inertia(body: Body, R: Array) -> Array:
     return moments
 
 
-_Value = Array | float
-"""(n,) of a chunk, or the number of a single state: Python's own arithmetic is ten times quicker on
-it than NumPy's."""
-
 _Rows = Array | list[list[float]]
 """Values of vectors along x, z and n: an array (3, k, n), or three lists of k numbers of a single
 state."""
@@ -295,9 +318,9 @@ state."""
 class _State(NamedTuple):
     """A chunk of states, each five values."""
 
-    q: Sequence[_Value]
-    qd: Sequence[_Value]
-    qdd: Sequence[_Value]
+    q: Sequence[Value]
+    qd: Sequence[Value]
+    qdd: Sequence[Value]
 
 
 def _state(motion: list[Array]) -> _State:
@@ -307,12 +330,12 @@ def _state(motion: list[Array]) -> _State:
     return _State(*(list(np.ascontiguousarray(x.T)) for x in motion))
 
 
-def _columns(vectors: Array) -> Sequence[_Value]:
+def _columns(vectors: Array) -> Sequence[Value]:
     """Return x, y and z of vectors (n, 3)."""
     return vectors[0].tolist() if len(vectors) == 1 else list(vectors.T)
 
 
-_Vector = tuple[_Value, _Value, _Value]
+_Vector = tuple[Value, Value, Value]
 """Along the axes x, z and n of the arm's plane."""
 
 
@@ -341,23 +364,6 @@ class _Outputs(NamedTuple):
         )
 
 
-def _by_virtual_work(
-    boom: Boom,
-    motion: Sequence[Array],
-    outside: Sequence[Array],
-    payload_as: PayloadAs,
-    applied: Sequence[Array | None],
-    out: _Outputs,
-) -> None:
-    """Fill the outputs of a chunk where the linkage is no parallelogram."""
-    base = BaseMotion.of(**dict(zip(BASE_ENTRIES, outside, strict=True))) if outside else BaseMotion.of()
-    q, qd, qdd = motion
-    found = balance(boom, q, qd, qdd, base, payload_as_force=payload_as == "force", tip_force=applied[0], tip_moment=applied[1])
-    out.tau[:] = found.tau
-    if out.pins is not None and out.mount is not None:
-        out.pins[:], out.mount[:] = found.pins, found.mount
-
-
 def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Return checked vectors (n, 3) for the n states of a shape.
 
@@ -371,13 +377,13 @@ def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise InputError(f"{name} has shape {values.shape}; it does not match states of shape {(*shape, 5)}") from None
 
 
-def _into_plane(state: _State, vector: Sequence[_Value]) -> _Vector:
+def _into_plane(state: _State, vector: Sequence[Value]) -> _Vector:
     """Return the components of a vector, given along frame 1, along x, z and n of the plane."""
     c, s = _cosine_and_sine(state.q[0])
     return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
 
 
-def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
+def _plane(boom: Boom, state: _State, *base: Sequence[Value]) -> _Plane:
     rate, accel = state.qd[0], state.qdd[0]
     if not base:
         level = (0.0, boom.gravity, 0.0)
@@ -392,14 +398,40 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1))
 
 
-def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> _Rows:
+class _Turn(NamedTuple):
+    """How a link at an angle turns in the arm's plane."""
+
+    c: Value
+    s: Value
+    rate: Value
+    accel: Value
+
+
+def _turns(g: Geometry, state: _State) -> tuple[tuple[_Turn, ...], Loop | None]:
+    """Return the turning of each pair of _LINKS, and the loop unless it is a parallelogram.
+
+    Raises:
+        InfeasibleError: the linkage cannot close.
+    """
+    q, qd, qdd = state
+    inner, lower = _Turn(*_cosine_and_sine(q[1]), qd[1], qdd[1]), _Turn(*_cosine_and_sine(q[2]), qd[2], qdd[2])
+    if g.is_parallelogram:
+        return (inner, lower, _Turn(*_cosine_and_sine(q[2] + q[4]), qd[2] + qd[4], qdd[2] + qdd[4])), None
+    loop = solved_loop(g, (inner.c, inner.s), (lower.c, lower.s))
+    both = loop.rates(qd[1], qd[2]), loop.accelerations((qd[1], qd[2]), qdd[1], qdd[2])
+    upper, outer = (_Turn(*unit, both[0][i], both[1][i]) for i, unit in enumerate((loop.upper, loop.outer)))
+    c, s = _cosine_and_sine(q[4])
+    tool = _Turn(upper.c * c - upper.s * s, upper.s * c + upper.c * s, upper.rate + qd[4], upper.accel + qdd[4])
+    return (inner, upper, tool, lower, outer), loop
+
+
+def _accelerations(state: _State, plane: _Plane, links: Sequence[_Turn], rho: Value) -> _Rows:
     """Return A, the acceleration of each vector b, along x, z and n.
 
-    It is an array (3, 11, n), or three lists for a single state.
-
-    C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
+    It is an array (3, m, n), or three lists for a single state.
     """
-    A: Any = [[0.0] * 11, [0.0] * 11, [0.0] * 11] if isinstance(rho, float) else np.empty((3, 11, *rho.shape))
+    count = 5 + 2 * len(links)
+    A: Any = [[0.0] * count for _ in range(3)] if isinstance(rho, float) else np.empty((3, count, *rho.shape))
     Ax, Az, An = A
     w1, w2, w3 = plane.W
     d1, d2, d3 = plane.W1
@@ -408,9 +440,7 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
     Ax[_X], Az[_X], An[_X] = -(w22 + w33), w12 + d3, w13 - d2
     Ax[_Z], Az[_Z], An[_Z] = w12 - d3, -(w11 + w33), w23 + d1
     Ax[_N], Az[_N], An[_N] = w13 + d2, w23 - d1, -(w11 + w22)
-    qd, qdd = state.qd, state.qdd
-    rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
-    for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
+    for (e, p), (c, s, rate, accel) in zip(_LINKS, links, strict=False):
         total, double = rate + w3, 2.0 * rate
         square = total * total
         along_x, along_z = square + w22, square + w11
@@ -422,10 +452,11 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
         Ax[p] = along_x * s - less * c
         Az[p] = -more * s - along_z * c
         An[p] = m * c - k * s
-    c, s, slide = C[1], S[1], 2.0 * qd[3]
-    turning = slide * (qd[2] + w3)
-    Ax[_RHO] = rho * Ax[_E3] + (qdd[3] * c - turning * s)
-    Az[_RHO] = rho * Az[_E3] + (qdd[3] * s + turning * c)
+    c, s, rate, _ = links[1]
+    slide, stretch = 2.0 * state.qd[3], state.qdd[3]
+    turning = slide * (rate + w3)
+    Ax[_RHO] = rho * Ax[_E3] + (stretch * c - turning * s)
+    Az[_RHO] = rho * Az[_E3] + (stretch * s + turning * c)
     An[_RHO] = rho * An[_E3] + slide * (w1 * s - w2 * c)
     rows: _Rows = A
     return rows
@@ -436,11 +467,10 @@ def _newton_euler(
 ) -> None:
     """Fill the outputs of a chunk, with a force and a moment on the tip."""
     g, q = model.boom.geometry, state.q
-    rho = g.L7 + q[3]
-    (c2, s2), (c3, s3), (ct, st) = _cosine_and_sine(q[1]), _cosine_and_sine(q[2]), _cosine_and_sine(q[2] + q[4])
-    A = _accelerations(state, plane, (c2, c3, ct), (s2, s3, st), rho)
+    rho, (links, loop), count = g.L7 + q[3], _turns(g, state), _count(g)
+    A = _accelerations(state, plane, links, rho)
     rows = model.rows if out.pins is not None else model.torque_rows
-    U = np.array(A[0] + A[1] + A[2]).reshape(3, 11).dot(rows.T) if isinstance(A, list) else rows @ A
+    U = np.array(A[0] + A[1] + A[2]).reshape(3, count).dot(rows.T) if isinstance(A, list) else rows @ A
     if model.hanging:
         _put_on(
             U, model.payload, (-model.hanging * plane.lift[0], -model.hanging * plane.lift[1], -model.hanging * plane.lift[2])
@@ -450,18 +480,27 @@ def _newton_euler(
     mx, mz, mn = (0.0, 0.0, 0.0) if moment is None else moment
     Ux, Uz, Un = U.tolist() if isinstance(A, list) else U
 
-    def about(c: _Value, s: _Value, e: int, p: int) -> _Value:
+    def about(link: _Turn, e: int, p: int) -> Value:
         """Return (b_e x U_e + b_p x U_p) . n."""
-        turned: _Value = c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
+        turned: Value = link.c * (Uz[e] - Ux[p]) - link.s * (Ux[e] + Uz[p])
         return turned
 
-    on_tool = about(ct, st, _ET, _PT) - mn
+    c3, s3 = links[1].c, links[1].s
+    on_links = [about(link, e, p) for (e, p), link in zip(_LINKS, links, strict=False)]
+    on_tool = on_links[2] - mn
     beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
     # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
-    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
+    reach = rho * c3 * Un[_RHO]
+    for (e, p), link in zip(_LINKS, links, strict=False):
+        reach = reach + (link.c * Un[e] - link.s * Un[p])
     tau_1 = Ux[_N] - Un[_X] - reach - mz
-    tau_2 = about(c2, s2, _E2, _P2)
-    tau_3 = about(c3, s3, _E3, _P3) + beyond_actuator
+    tau_2, tau_3 = on_links[0], on_links[1] + beyond_actuator
+    in_plane = tau_2 + tau_3
+    if loop is not None:
+        at_psi, (lower, outer) = tau_3, on_links[3:]
+        in_plane = in_plane + lower + outer
+        tau_2 = tau_2 + loop.upper_by[0] * at_psi + loop.outer_by[0] * outer
+        tau_3 = lower + loop.upper_by[1] * at_psi + loop.outer_by[1] * outer
     tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
     tau = (tau_1, tau_2, tau_3, tau_4, on_tool)
     if isinstance(A, list):
@@ -471,21 +510,26 @@ def _newton_euler(
     if out.pins is None or out.mount is None:
         return
 
-    # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from
+    # Pin 7 lies L5 along the upper link's direction from pin 8, and L4 along the outer link's from
     # pin 6: the moments about pins 8 and 6 give the force at pin 7 across both directions, and the
     # balance of forces the other two.
-    M_outer = about(c2, s2, 12, 13)
-    M_top = about(c3, s3, 15, 16) + beyond_actuator
-    sine = s3 * c2 - c3 * s2
+    outer_link = links[0] if loop is None else links[4]
+    c4, s4 = outer_link.c, outer_link.s
+    M_outer = about(outer_link, count + 1, count + 2)
+    M_top = about(links[1], count + 4, count + 5) + beyond_actuator
+    sine = s3 * c4 - c3 * s4
     with np.errstate(divide="ignore", invalid="ignore"):
-        along_inner, along_lower = np.divide(-M_top, g.L5 * sine), np.divide(-M_outer, g.L4 * sine)
-        f7x, f7z = along_inner * c2 + along_lower * c3, along_inner * s2 + along_lower * s3
-    for pin, x, z in ((0, Ux[11] + f7x, Uz[11] + f7z), (1, f7x, f7z), (2, Ux[14] - f7x, Uz[14] - f7z)):
+        along_outer, along_upper = np.divide(-M_top, g.L5 * sine), np.divide(-M_outer, g.L4 * sine)
+        f7x, f7z = along_outer * c4 + along_upper * c3, along_outer * s4 + along_upper * s3
+    forces = ((Ux[count] + f7x, Uz[count] + f7z), (f7x, f7z), (Ux[count + 3] - f7x, Uz[count + 3] - f7z))
+    for pin, (x, z) in enumerate(forces):
         out.pins[pin, :, 0], out.pins[pin, :, 2] = x, z
 
-    rise = (s2 * Un[_E2] + c2 * Un[_P2]) + (s3 * Un[_E3] + c3 * Un[_P3]) + rho * s3 * Un[_RHO] + (st * Un[_ET] + ct * Un[_PT])
+    rise = rho * s3 * Un[_RHO]
+    for (e, p), link in zip(_LINKS, links, strict=False):
+        rise = rise + (link.s * Un[e] + link.c * Un[p])
     Mx = Un[_Z] - Uz[_N] + rise - mx
-    Mn = Uz[_X] - Ux[_Z] + tau_2 + tau_3
+    Mn = Uz[_X] - Ux[_Z] + in_plane
     c1, s1 = _cosine_and_sine(q[0])
     mount = out.mount
     for row, along, normal in ((0, Ux[_O], Un[_O]), (3, Mx, Mn)):
@@ -495,7 +539,7 @@ def _newton_euler(
     mount[:, 5] = -tau_1
 
 
-def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
+def _cosine_and_sine(angle: Value) -> tuple[Value, Value]:
     """By the tangent of half the angle, to 3e-16: NumPy's tangent is vectorised for doubles, its cosine and sine are not."""
     t = tan(0.5 * angle) if isinstance(angle, float) else np.tan(0.5 * angle)
     u = 2.0 / (1.0 + t * t)
@@ -504,9 +548,10 @@ def _cosine_and_sine(angle: _Value) -> tuple[_Value, _Value]:
 
 def _put_on(U: Array, g: Array, force: _Vector) -> None:
     """Take a force at the point g off what the bodies need, in place."""
+    count = len(g)
     for row, along in zip(U, force, strict=True):
         taken = np.multiply.outer(g, along)
         taken = taken if taken.ndim == row.ndim else taken[:, None]  # the same force in every state
-        row[:11] -= taken
-        if len(row) > 11:
-            row[14:] -= taken[[_O, _E3, _P3]]
+        row[:count] -= taken
+        if len(row) > count:
+            row[count + 3 :] -= taken[[_O, _E3, _P3]]
