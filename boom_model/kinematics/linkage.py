@@ -121,6 +121,24 @@ def lower_angle(boom: Boom, theta2: ArrayLike, psi: ArrayLike) -> Array:
     return np.where(_handed(theta3 - theta2) == hand, theta3, np.nan)
 
 
+def within_reach(boom: Boom, q: Array, margin: float) -> Array:
+    """Return q (..., 5) with theta3 moved to where lower - inner is `margin` [rad] within what the links reach.
+
+    Positions beyond it have no loads. In a parallelogram nothing is moved.
+    """
+    g = boom.geometry
+    if g.is_parallelogram:
+        return q
+    # pins 6 and 8 are between |L4 - L5| and L4 + L5 apart
+    far, near = (
+        float(np.arccos(np.clip((g.L3**2 + g.L9**2 - apart**2) / (2.0 * g.L3 * g.L9), -1.0, 1.0)))
+        for apart in (g.L4 + g.L5, g.L4 - g.L5)
+    )
+    moved = q.copy()
+    moved[..., 2] = q[..., 1] + np.clip(q[..., 2] - q[..., 1], near + margin, far - margin)
+    return moved
+
+
 def require_closed(boom: Boom, q: Array) -> Array:
     """Return psi (...) at q (..., 5).
 

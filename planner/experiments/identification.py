@@ -23,6 +23,7 @@ from boom_model import JOINTS, Boom, breakdown
 from boom_model.arrays import Array, read_only
 from boom_model.boom import LOAD_UNITS
 from boom_model.dynamics.regressor import body_of_pseudo_inertia, body_parameters, pseudo_inertia_of_parameters
+from boom_model.kinematics.linkage import within_reach
 from planner.experiments.consistency import consistent_fit
 from planner.experiments.log_checks import delay_notes, require_plausible_torques
 from planner.experiments.readings import Readings
@@ -334,6 +335,7 @@ def _structure(boom: Boom, drive_inertia: bool) -> tuple[Array, tuple[int, ...],
     rng, limits = np.random.default_rng(0), boom.limits
     q = rng.uniform(limits.lower, limits.upper, (_STATES, 5))
     q[:, 2] = rng.uniform(np.maximum(limits.lower[2], q[:, 1] + limits.linkage), limits.upper[2])
+    q = within_reach(boom, q, limits.linkage)
     qd, qdd = (rng.uniform(-1.0, 1.0, (_STATES, 5)) * size for size in (limits.velocity, limits.acceleration))
     Y = unknowns.rows(q, qd, qdd).reshape(-1, 90)
     norms = np.linalg.norm(Y, axis=0)
