@@ -205,7 +205,7 @@ def evenly_sampled(log: Log, window: float) -> Log:
     return Log(t, notes=(*log.notes, note), **read)
 
 
-def _calibrated(boom: Boom, log: Log) -> Log:
+def calibrated(boom: Boom, log: Log) -> Log:
     """Return the log with joint positions in the place of readings, where the boom is calibrated."""
     known = boom.calibration
     if known is None:
@@ -363,7 +363,7 @@ def compare(
     """
     if planned.t.size < 2:
         raise InputError("the plan has a single sample; it needs at least 2")
-    ready = smoothed(_calibrated(boom, log), window)
+    ready = smoothed(calibrated(boom, log), window)
     curve = _curve(planned)
     best = _best_offset(boom, planned, curve, ready.trajectory)
     offset = best if offset is None else scalar("offset", offset)

@@ -25,7 +25,12 @@ from boom_model.boom import LOAD_UNITS
 from boom_model.dynamics.regressor import body_of_pseudo_inertia, body_parameters, pseudo_inertia_of_parameters
 from boom_model.kinematics.linkage import within_reach
 from planner.experiments.consistency import consistent_fit
-from planner.experiments.log_checks import delay_notes, require_plausible_torques
+from planner.experiments.log_checks import (
+    delay_notes,
+    require_plausible_positions,
+    require_plausible_torques,
+    residual_notes,
+)
 from planner.experiments.readings import Readings
 from planner.experiments.unknowns import IDENTIFIED_BODIES, Unknowns
 
@@ -175,11 +180,13 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
         drive_inertia: whether the torques accelerate the drives' own inertia too, as those computed from motor currents do.
 
     Raises:
-        InputError: the torques have the wrong sign, unit or side of the gearbox; the message says which.
+        InputError: positions are in another unit, or torques have the wrong sign, unit or side of the gearbox; the message says
+            which.
         InfeasibleError: as `consistent_fit`.
     """
     seen = [log.part(slice(0, round((1.0 - HELD_OUT) * len(log.t)))) for log in logs]
     kept = [log.part(slice(round((1.0 - HELD_OUT) * len(log.t)), None)) for log in logs]
+    require_plausible_positions(boom, logs)
     require_plausible_torques(boom, seen)
     scale = np.maximum(np.sqrt(np.mean(np.concatenate([log.tau for log in seen]) ** 2, axis=0)), 1e-3)
     unknowns = Unknowns(boom, drive_inertia, scale)
@@ -205,6 +212,7 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
     notes = (
         *dict.fromkeys(note for log in logs for note in log.notes),
         *silent,
+        *residual_notes(np.array([joint.after for joint in joints]), np.array([joint.noise for joint in joints])),
         *delay_notes(*_delay(found, seen, data, H, variance)),
     )
     return replace(found, joints=joints, notes=notes)
