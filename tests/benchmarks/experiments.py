@@ -1,7 +1,7 @@
 """Virtual experiments in MuJoCo: does the fit reach the noise, are its intervals right, are its bodies possible?
 
-Run it by hand: `python -m tests.benchmarks.experiments [FIRST] [LAST]`, for the seeds FIRST to LAST - 1. Each is a boom with
-other masses and friction that moves for 30 s at 1 kHz, fitted to all of it, to its first second and to a tenth of a second.
+Run it by hand: `python -m tests.benchmarks.experiments [FIRST LAST [SECONDS]]`, for the seeds FIRST to LAST - 1. Each is a boom
+with other masses and friction that moves for SECONDS (30) at 1 kHz, fitted to all of it, to a second and to a tenth of one.
 """
 
 import sys
@@ -17,7 +17,6 @@ from planner.experiments.readings import readings_of
 from tests.builders import without_drives
 from tests.virtual_boom import TORQUE_NOISE, experiment, fourier, perturbed, true_parameters
 
-DURATION = 30.0
 SHORT = (0.1, 1.0)
 
 
@@ -34,14 +33,14 @@ def least_eigenvalue(found: Identification) -> float:
     return float((values[:, 0] / values[:, -1]).min())
 
 
-def main(first: int, last: int) -> None:
+def main(first: int, last: int, duration: int) -> None:
     """Print a line a seed, and the sums."""
     boom = without_drives(Boom.load()).with_payload(0.0)
     within, chi, count, held, least, inside = 0, 0.0, 0, 0.0, np.inf, 0
     for seed in range(first, last):
         rng, begun = np.random.default_rng(1000 + seed), time.process_time()
         truth = perturbed(boom, rng)
-        log = experiment(boom, truth, fourier(boom, rng), DURATION, rng).log
+        log = experiment(boom, truth, fourier(boom, rng), duration, rng).log
         simulated = time.process_time()
         found = identify(boom, [readings_of(log)], drive_inertia=True)
         taken, base = time.process_time() - simulated, found.base
@@ -68,4 +67,5 @@ def main(first: int, last: int) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(word) for word in sys.argv[1:3] or ("0", "10")))
+    given = [int(word) for word in sys.argv[1:]]
+    main(*given, *(0, 10, 30)[len(given) :])
