@@ -30,6 +30,7 @@ from planner.experiments.log_checks import (
     require_plausible_positions,
     require_plausible_torques,
     residual_notes,
+    rotor_notes,
 )
 from planner.experiments.readings import Readings
 from planner.experiments.unknowns import IDENTIFIED_BODIES, Unknowns
@@ -212,6 +213,7 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
     notes = (
         *dict.fromkeys(note for log in logs for note in log.notes),
         *silent,
+        *(() if drive_inertia else _rotor_notes(found, logs)),
         *residual_notes(np.array([joint.after for joint in joints]), np.array([joint.noise for joint in joints])),
         *delay_notes(*_delay(found, seen, data, H, variance)),
     )
@@ -398,6 +400,12 @@ def _joint_fits(found: Identification, seen: Sequence[Readings], kept: Sequence[
         each = {name: float(np.sqrt(np.mean(values[:, i] ** 2))) for name, values in parts.items()}
         fits.append(JointFit(joint, LOAD_UNITS[i], float(before[i]), float(after[i]), float(noise[i]), float(inside[i]), each))
     return tuple(fits)
+
+
+def _rotor_notes(found: Identification, logs: Sequence[Readings]) -> tuple[str, ...]:
+    left = [(log.tau - found.unknowns.torque(found.parameters, log)) * log.moving for log in logs]
+    noise = np.sqrt(np.mean([log.torque_noise**2 for log in logs], axis=0))
+    return rotor_notes(np.concatenate(left), np.concatenate([log.qdd * log.moving for log in logs]), noise)
 
 
 def _parts(found: Identification, logs: Sequence[Readings]) -> dict[str, Array]:

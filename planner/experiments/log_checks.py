@@ -22,6 +22,7 @@ _NOTICED = 2e-3  # [s]
 _BEYOND = 0.25  # share of a joint's range by which a position may be outside of its limits
 _FRICTION = 0.2  # share of the torque's power that friction must have, to judge by
 _ONE_WAY = 0.8  # mean direction of a joint from which on it moves one way
+_ROTOR = 0.2  # share of the noise that a rotor's torque must have for a note
 _LEFT = 2.0  # times the noise that may stay unexplained without a note
 
 
@@ -141,6 +142,17 @@ def _braking(A: Array, b: Array) -> float:
     small = abs(spent) < _FRICTION * float(np.abs(b * A[:, 2]).sum())
     one_way = abs(float(A[:, 3].mean())) > _ONE_WAY  # then a constant torque is like dry friction
     return 0.0 if small or one_way or deviation == 0.0 else spent / deviation
+
+
+def rotor_notes(left: Array, qdd: Array, noise: Array) -> tuple[str, ...]:
+    """Say which joints' unexplained torques (n, 5) follow their accelerations (n, 5), as those of motors do."""
+    energy = np.maximum((qdd**2).sum(axis=0), 1e-300)
+    inertia = (left * qdd).sum(axis=0) / energy
+    sure = inertia * np.sqrt(energy) > _SURE * left.std(axis=0)
+    names = [JOINTS[i] for i in np.flatnonzero(sure & (inertia * np.sqrt(energy / len(qdd)) > _ROTOR * noise))]
+    if not names:
+        return ()
+    return (f"unexplained torque of {', '.join(names)} follows the acceleration: torques of motors need --drive-inertia",)
 
 
 def residual_notes(after: Array, noise: Array) -> tuple[str, ...]:

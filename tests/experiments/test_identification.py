@@ -239,6 +239,14 @@ def test_torques_that_are_stamped_late_are_noticed() -> None:
     assert not any("stamped" in note for note in identified(3).notes)
 
 
+def test_torques_of_motors_are_noticed() -> None:
+    notes = identify(BOOM, [readings_of(measured(0).log)]).notes
+    said = [note for note in notes if "follows the acceleration: torques of motors need --drive-inertia" in note]
+    assert len(said) == 1
+    assert "extension" in said[0]
+    assert not any("follows the acceleration" in note for note in identified(0).notes)
+
+
 START, GOAL = np.array([0.3, 0.4, 1.8, 0.2, -0.8]), np.array([1.5, 1.2, 2.8, 0.8, 0.9])
 
 
