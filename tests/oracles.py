@@ -189,8 +189,9 @@ def mujoco_inverse_dynamics(
 def mujoco_closed_loop(boom: Boom, q: Array, qd: Array, qdd: Array, base: BaseMotion | None = None) -> ClosedLoads:
     """Loads of n states (n, 5) by Lagrange multipliers on MuJoCo's tree, for links of any lengths.
 
-    MuJoCo's Jacobians of either half of pin 7 close the loop in position (by Newton's method), velocity and acceleration. The
-    passive joints at pins 6 and 8 bear no torque, which gives the force at pin 7.
+    MuJoCo's Jacobians of either half of pin 7 close the loop in position (by Newton's method),
+    velocity and acceleration. The passive joints at pins 6 and 8 bear no torque, which gives the
+    force at pin 7.
     """
     model = mujoco_model(boom)
     data, halves = mujoco.MjData(model), [model.site(f"pin 7 of {link}").id for link in ("upper", "outer")]

@@ -157,7 +157,10 @@ def potential_energy(boom: Boom, q: ArrayLike, *, up: ArrayLike = (0.0, 0.0, 1.0
 
 
 def _by_elements(boom: Boom, q: Array) -> Array:
-    """Return M (n, 5, 5) of any linkage: sum_ab db_a/dq_i . Q_ab db_b/dq_j over the vectors b of `newton_euler`."""
+    """Return M (n, 5, 5) of any linkage, sum_ab db_a/dq_i . Q_ab db_b/dq_j.
+
+    The vectors b and Q are those of `newton_euler`.
+    """
     moved = element_velocities(boom, q).transpose(3, 0, 1, 2)  # (n, 5, 3, m)
     carried = moved @ regrouped(boom, "mass").torque_rows
     shape = (len(q), 5, -1)

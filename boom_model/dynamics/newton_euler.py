@@ -14,10 +14,11 @@ Newton's and Euler's equations of a set of bodies ask no more of its masses than
 U = Q A, the force on the set is U_o, and its moment about any pin a sum of b_i x U_i. The equilibrium of tool, extension,
 upper, outer, inner and lower link gives the joint torques and the pin forces from these (eqs. 2.45-2.71).
 
-Where opposite links are unequal, the upper link turns at psi and the outer one at chi (see `linkage`). Then psi stands in the
-place of theta3 above, and four vectors more are needed: el, pl of the lower link at theta3, and eo, po of the outer one at
-chi. The torque of theta2 is the sum of the torques at theta2, psi and chi, each times the derivative of its angle by theta2;
-that of theta3 likewise.
+Where opposite links are unequal, the upper link turns at psi and the outer one at chi (see
+`linkage`). Then psi stands in the place of theta3 above, and four vectors more are needed: el, pl
+of the lower link at theta3, and eo, po of the outer one at chi. The torque of theta2 is the sum of
+the torques at theta2, psi and chi, each times the derivative of its angle by theta2; that of theta3
+likewise.
 """
 
 from collections.abc import Sequence
@@ -55,8 +56,8 @@ class PinForces:
     """Forces at the linkage's pins [N], each (..., 3) in frame 4: x forward, y to the left, z up, yawing with theta1.
 
     They lie in the arm's plane: how pins 7 and 8 share the load across it is statically indeterminate, so y is 0. They grow
-    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right, and as 1/sin(chi - psi) where
-    links are unequal: see `transmission_angle`.
+    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right, and as
+    1/sin(chi - psi) where links are unequal: see `transmission_angle`.
     """
 
     frame_6: Array
@@ -188,7 +189,9 @@ def base_series(base: BaseMotion | None, shape: tuple[int, ...]) -> list[Array]:
 
 
 def element_accelerations(boom: Boom, q: Array, qd: Array, qdd: Array, *base: Array) -> Array:
-    """Return A (3, m, n) of the m vectors b at n states (n, 5) along x, z and n, on a base moved as `base_series` says.
+    """Return A (3, m, n) of the m vectors b at n states (n, 5) along x, z and n.
+
+    The base moves as `base_series` says.
 
     Raises:
         InfeasibleError: a linkage of unequal links cannot close at q.

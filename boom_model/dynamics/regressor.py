@@ -26,7 +26,8 @@ On a base at rest 29 combinations of the 70 parameters (the payload's belong to 
     7  products with the normal of the arm's plane
 
 A base that tilts and turns shows 6 more: the yawing body's first moments across its axis, and the rest of its inertia.
-Unequal links show 8 more, weakly, because the lower and the outer link no longer turn with the upper and the inner one.
+Unequal links show 8 more, weakly, because the lower and the outer link no longer turn with the
+upper and the inner one.
 """
 
 import numpy as np

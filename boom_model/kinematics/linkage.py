@@ -60,7 +60,7 @@ class Loop(NamedTuple):
         return upper, outer
 
     def accelerations(self, rates: tuple[Value, Value], inner: Value, lower: Value) -> tuple[Value, Value]:
-        """Return the second derivatives of psi and chi at rates and accelerations of theta2 and theta3."""
+        """Return the second derivatives of psi and chi; those of theta2 and theta3 are given."""
         upper, outer = self.rates(*rates)
         turned = (rates[0] * rates[0], rates[1] * rates[1], outer * outer, upper * upper)
         upper, outer = self.rates(inner, lower)
@@ -122,9 +122,10 @@ def lower_angle(boom: Boom, theta2: ArrayLike, psi: ArrayLike) -> Array:
 
 
 def within_reach(boom: Boom, q: Array, margin: float) -> Array:
-    """Return q (..., 5) with theta3 moved to where lower - inner is `margin` [rad] within what the links reach.
+    """Return q (..., 5) with theta3 moved to where the links reach each other.
 
-    Positions beyond it have no loads. In a parallelogram nothing is moved.
+    lower - inner is then `margin` [rad] within that range; positions beyond it have no loads. In a
+    parallelogram nothing is moved.
     """
     g = boom.geometry
     if g.is_parallelogram:
@@ -211,7 +212,7 @@ def _cosine(a: Unit, b: Unit) -> Value:
 
 
 def _cannot_close(g: Geometry, sine: Array, inner: Unit, lower: Unit) -> InfeasibleError:
-    """Return the error for the first state whose sine of the angle between outer and upper link is NaN or 0."""
+    """Return the error for the first state whose sine of outer less upper angle is NaN or 0."""
     bad = np.isnan(sine) | (sine == 0.0)
     delta = np.mod(np.degrees(np.arctan2(_sine(lower, inner), _cosine(lower, inner))) + 90.0, 360.0) - 90.0
     at = float(np.broadcast_to(delta, sine.shape)[bad].flat[0])

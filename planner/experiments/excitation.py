@@ -44,8 +44,8 @@ costs amplitude."""
 _DIFFERENCE = 1e-6
 _SMOOTH = 0.03
 _FROM_REACH = np.radians(0.5)
-"""Unequal links do not close beyond their reach. The loads of a motion that the optimiser tries there
-are those of half a degree before it, which no drive bears for long."""
+"""Unequal links do not close beyond their reach. What the optimiser tries there is given the loads of
+half a degree before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,7 +224,10 @@ def _information(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
 
 @lru_cache(maxsize=8)
 def _columns(boom: Boom) -> tuple[Array, Array]:
-    """Columns of the base parameters of equal links: what unequal ones show besides is too weak to design for."""
+    """Columns of the base parameters of equal links.
+
+    What unequal ones show besides is too weak to design for.
+    """
     return base_columns(replace(boom, geometry=replace(boom.geometry, upper_less_lower=0.0, inner_less_outer=0.0)))
 
 

@@ -181,8 +181,8 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
         drive_inertia: whether the torques accelerate the drives' own inertia too, as those computed from motor currents do.
 
     Raises:
-        InputError: positions are in another unit, or torques have the wrong sign, unit or side of the gearbox; the message says
-            which.
+        InputError: positions are in another unit, or torques have the wrong sign, unit or side of
+            the gearbox; the message says which.
         InfeasibleError: as `consistent_fit`.
     """
     seen = [log.part(slice(0, round((1.0 - HELD_OUT) * len(log.t)))) for log in logs]

@@ -1,7 +1,8 @@
-"""Slips that a log gives away: units of positions; sign, unit and side of the gearbox of torques; late time stamps.
+"""Slips that a log gives away: units; sign and side of the gearbox of torques; late time stamps.
 
-Where a joint's torque is mostly that of masses, its gain over the torque of the boom's file shows the slip. Where friction
-hides the masses, two facts are left: friction brakes, and the torque is not far smaller than the masses alone need.
+Where a joint's torque is mostly that of masses, its gain over the torque of the boom's file shows
+the slip. Where friction hides the masses, two facts are left: friction brakes, and the torque is
+not far smaller than the masses alone need.
 """
 
 from collections.abc import Sequence
@@ -82,7 +83,7 @@ def require_plausible_positions(boom: Boom, logs: Sequence[Readings]) -> None:
 
 
 def _require_size(boom: Boom, logs: Sequence[Readings], i: int) -> None:
-    """Refuse torques that are far smaller than the masses of the boom's file need, with or without friction."""
+    """Refuse torques that are far smaller than the masses of the boom's file need."""
     squares = np.zeros(2)
     for log in logs:
         model = inverse_dynamics(boom, log.q, log.qd, log.qdd, reactions=False).tau[:, i]
@@ -106,9 +107,9 @@ def _refuse(i: int, gain: float, meant: str) -> None:
 
 
 def _gain(boom: Boom, logs: Sequence[Readings], joint: int) -> tuple[float, float, float]:
-    """Return the gain of a joint and the share of the torque beside friction and drive inertia that it explains.
+    """Return the gain of a joint, the share of the torque that it explains, and friction's power.
 
-    The third figure is the mean power of the fitted friction, in its standard deviations.
+    The share is of the torque beside friction and drive inertia, the power as `_braking` says.
     """
     columns, right = [], []
     for log in logs:
@@ -131,7 +132,10 @@ def _gain(boom: Boom, logs: Sequence[Readings], joint: int) -> tuple[float, floa
 
 
 def _braking(A: Array, b: Array) -> float:
-    """Return the power of friction, A's columns 2 and 3, by its standard deviation; 0 if it is a small part of the whole."""
+    """Return the power of friction, A's columns 2 and 3, by its standard deviation.
+
+    It is 0 if it is a small part of the whole, or the joint moves one way.
+    """
     scale = np.maximum(np.abs(A).max(axis=0), 1e-300)
     inverse = np.linalg.pinv(A / scale)
     x, speed = inverse @ b, np.abs(A[:, 2])
@@ -145,7 +149,7 @@ def _braking(A: Array, b: Array) -> float:
 
 
 def rotor_notes(left: Array, qdd: Array, noise: Array) -> tuple[str, ...]:
-    """Say which joints' unexplained torques (n, 5) follow their accelerations (n, 5), as those of motors do."""
+    """Say which joints' unexplained torques (n, 5) follow their accelerations, as motors' do."""
     energy = np.maximum((qdd**2).sum(axis=0), 1e-300)
     inertia = (left * qdd).sum(axis=0) / energy
     sure = inertia * np.sqrt(energy) > _SURE * left.std(axis=0)
@@ -156,7 +160,7 @@ def rotor_notes(left: Array, qdd: Array, noise: Array) -> tuple[str, ...]:
 
 
 def residual_notes(after: Array, noise: Array) -> tuple[str, ...]:
-    """Say which joints' torques (5,) stay unexplained far beyond their noise, and what to look for."""
+    """Say which joints' torques (5,) stay unexplained far beyond their noise."""
     names = [f"{JOINTS[i]} ({after[i] / noise[i]:.1f} times the noise)" for i in np.flatnonzero(after > _LEFT * noise)]
     if not names:
         return ()

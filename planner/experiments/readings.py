@@ -112,9 +112,9 @@ def readings_of(log: Log, cutoff: float | None = None) -> Readings:
         cutoff: of the filter [Hz]. None selects the narrowest that removes noise alone.
 
     Raises:
-        InputError: there are no torques or fewer than 40 samples, samples are too far apart or a gap is too long, a joint does
-            not move beyond its noise, a torque never changes, or the cut-off is not below half the sampling rate. The message
-            says what to measure instead.
+        InputError: there are no torques or fewer than 40 samples, samples are too far apart or a
+            gap is too long, a joint does not move beyond its noise, a torque never changes, or the
+            cut-off is not below half the sampling rate. The message says what to measure instead.
     """
     if log.tau is None:
         raise InputError("the log has no torques: measure tau1..tau5, at the joints or as motor currents")

@@ -1,9 +1,12 @@
 """`identify` side by side with MuJoCo's own `mujoco.sysid`, on the same log and the exported model.
 
-Run it by hand, where `pip install "mujoco[sysid]"` has been: `python -m tests.benchmarks.against_sysid [SEED] [ITERATIONS]`.
-MuJoCo's toolbox fits positions of simulated motions: the log is cut into parts of 0.1 s that start from its filtered states.
-It gets the same unknowns: pseudo-inertias of all bodies, drive inertia, viscous and dry friction. It has no friction that
-differs between directions, so the true boom has none here.
+Run it by hand, after `pip install "mujoco[sysid]"`:
+`python -m tests.benchmarks.against_sysid [SEED ITERATIONS]`.
+
+MuJoCo's toolbox fits positions of simulated motions: the log is cut into parts of 0.1 s that start
+from its filtered states. It gets the same unknowns: pseudo-inertias of all bodies, drive inertia,
+viscous and dry friction. It has no friction that differs between directions, so the true boom has
+none here.
 """
 
 import sys
@@ -47,7 +50,10 @@ def spec_of(boom: Boom) -> mujoco.MjSpec:
 
 
 def put_body(spec: mujoco.MjSpec, param: sysid.Parameter) -> None:
-    """Set a body by its pseudo-inertia's parameters; the toolbox's own way leaves this model without inertia (MuJoCo 4.0.0)."""
+    """Set a body by its pseudo-inertia's parameters.
+
+    The toolbox's own way leaves this model without inertia (MuJoCo 4.0.0).
+    """
     body = spec.body(param.name.removesuffix("_inertia"))
     pi = sysid.model_modifier.pi_from_theta(param.value)
     com, about_frame = pi[1:4] / pi[0], pi[4:].reshape(3, 3)
@@ -113,7 +119,7 @@ class Judge(NamedTuple):
     """states of another motion"""
 
     def show(self, name: str, seconds: float, p: Array) -> None:
-        """Print what the parameters p leave of the held-out torques, and how far they are off on another motion."""
+        """Print what the parameters p leave of the held-out torques, and their error elsewhere."""
         tau, used = self.unknowns.torque(p, self.kept), self.kept.moving
         left, wrong = (np.sqrt(((y - tau) ** 2 * used).sum(axis=0) / used.sum(axis=0)) for y in (self.kept.tau, self.clean))
         other = np.sqrt(np.mean((self.unknowns.rows(*self.others) @ (p - self.truth)) ** 2, axis=0))

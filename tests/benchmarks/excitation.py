@@ -1,6 +1,7 @@
-"""Condition number of the designed motion against random feasible motions and the thesis's move of table 2-4.
+"""Condition number of the designed motion, of random feasible ones and of table 2-4's cubic.
 
-Run it by hand: `python -m tests.benchmarks.excitation [COUNT]`. 1,000 random motions take some four minutes of one core.
+Run it by hand: `python -m tests.benchmarks.excitation [COUNT]`. 1,000 random motions take some six
+minutes of one core.
 """
 
 import sys

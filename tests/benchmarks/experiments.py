@@ -1,7 +1,8 @@
-"""Virtual experiments in MuJoCo: does the fit reach the noise, are its intervals right, are its bodies possible?
+"""Virtual experiments in MuJoCo: held-out error, intervals, and whether the bodies are possible.
 
-Run it by hand: `python -m tests.benchmarks.experiments [FIRST LAST [SECONDS]]`, for the seeds FIRST to LAST - 1. Each is a boom
-with other masses and friction that moves for SECONDS (30) at 1 kHz, fitted to all of it, to a second and to a tenth of one.
+Run it by hand: `python -m tests.benchmarks.experiments [FIRST LAST [SECONDS]]`, for the seeds FIRST
+to LAST - 1. Each is a boom with other masses and friction that moves for SECONDS (30) at 1 kHz. It
+is fitted to all of that, to a second and to a tenth of one.
 """
 
 import sys

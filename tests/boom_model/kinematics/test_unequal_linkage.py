@@ -135,7 +135,7 @@ def test_a_force_on_the_tip_works_by_the_jacobian():
 
 
 def test_equal_links_are_the_limit():
-    """Links that differ by less than rounding take the way of unequal ones, and give what the parallelogram gives."""
+    """Links that differ by less than rounding take the way of unequal ones."""
     q, qd, qdd = states(200)
     boom = generic(BOOM)
     equal = replace(boom, geometry=replace(boom.geometry, upper_less_lower=1e-300))
