@@ -6,6 +6,7 @@ not far smaller than the masses alone need.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,20 +31,22 @@ _LEFT = 2.0  # times the noise that may stay unexplained without a note
 def require_plausible_torques(boom: Boom, logs: Sequence[Readings], *, payload_known: bool = True) -> None:
     """Refuse torques that are not those of this boom's joints in Nm and N.
 
-    Each joint's torques are fitted by gain tau_file + inertia qdd + viscous qd + coulomb sign(qd) + constant, with the torques
-    tau_file of the boom's file. Where tau_file explains most of what the rest leaves, a gain far from 1 is a slip. If the
-    payload is not known, only a gain like that of another sign or unit is.
+    Each joint's torques are fitted by gain tau_file + inertia qdd + viscous qd + coulomb sign(qd) +
+    constant, with the torques tau_file of the boom's file. Where tau_file explains most of what the
+    rest leaves, a gain far from 1 is a slip. If the payload is not known, only a gain like that of
+    another sign or unit is.
 
     Raises:
         InputError: a gain is negative or a power of ten or a gear ratio away from 1. The message says what it looks like.
     """
     for i in range(len(JOINTS)):
-        gain, explained, braking = _gain(boom, logs, i)
-        if explained < _EXPLAINED:  # friction and noise hide what the masses do
-            if payload_known:
-                if braking < -_SURE:
+        fit = _fitted(boom, logs, i)
+        gain = fit.gain
+        if fit.explained < _EXPLAINED:  # friction and noise hide what the masses do
+            if payload_known and not fit.one_way:
+                if fit.braking < -_SURE:
                     _turned(i, "friction drives the joint")
-                _require_size(boom, logs, i)
+                _require_size(boom, fit, i)
             continue
         unit = "N" if IS_LENGTH[i] else "Nm"
         if gain < 0.0:
@@ -82,17 +85,12 @@ def require_plausible_positions(boom: Boom, logs: Sequence[Readings]) -> None:
             )
 
 
-def _require_size(boom: Boom, logs: Sequence[Readings], i: int) -> None:
+def _require_size(boom: Boom, fit: "_Fit", i: int) -> None:
     """Refuse torques that are far smaller than the masses of the boom's file need."""
-    squares = np.zeros(2)
-    for log in logs:
-        model = inverse_dynamics(boom, log.q, log.qd, log.qdd, reactions=False).tau[:, i]
-        squares += [float(model @ model), float(log.tau[:, i] @ log.tau[:, i])]
-    share = float(np.sqrt(squares[1] / squares[0])) if squares[0] > 0.0 else 1.0
-    if share < 1.0 / _ALIKE:
+    if max(fit.size, fit.gain + _SURE * fit.deviation) < 1.0 / _ALIKE:
         unit, drive = "N" if IS_LENGTH[i] else "Nm", boom.drives[i]
         ratio = "" if drive is None else f" of ratio {drive.gearbox.ratio:g}"
-        _refuse(i, share, f"must be in {unit}, behind the gearbox{ratio}, and --payload what the boom carried")
+        _refuse(i, fit.size, f"must be in {unit}, behind the gearbox{ratio}, and --payload what the boom carried")
 
 
 def _turned(i: int, why: str) -> None:
@@ -106,11 +104,23 @@ def _refuse(i: int, gain: float, meant: str) -> None:
     raise InputError(f"the torques of {JOINTS[i]} (tau{i + 1}) are {gain:.3g} times those of the boom's file: they {meant}")
 
 
-def _gain(boom: Boom, logs: Sequence[Readings], joint: int) -> tuple[float, float, float]:
-    """Return the gain of a joint, the share of the torque that it explains, and friction's power.
+class _Fit(NamedTuple):
+    """A joint's torques by gain tau_file + inertia qdd + viscous qd + coulomb sign(qd) + constant."""
 
-    The share is of the torque beside friction and drive inertia, the power as `_braking` says.
-    """
+    gain: float = 1.0
+    deviation: float = np.inf
+    """of the gain, for noise that is white"""
+    explained: float = 0.0
+    """Share of the torque beside friction and drive inertia that tau_file explains."""
+    braking: float = 0.0
+    """Power of friction, as `_braking` says."""
+    size: float = 1.0
+    """RMS of the torques by that of tau_file."""
+    one_way: bool = True
+    """Whether the joint moves one way; a constant torque is then like dry friction."""
+
+
+def _fitted(boom: Boom, logs: Sequence[Readings], joint: int) -> _Fit:
     columns, right = [], []
     for log in logs:
         some = slice(None, None, max(1, len(log.t) * len(logs) // _SAMPLES))
@@ -121,21 +131,24 @@ def _gain(boom: Boom, logs: Sequence[Readings], joint: int) -> tuple[float, floa
         right.append(log.tau[some, joint][used])
     A, b = np.concatenate(columns), np.concatenate(right)
     if len(b) <= 2 * A.shape[1]:
-        return 1.0, 0.0, 0.0
-    braking = _braking(A, b)
+        return _Fit()
     model, tau = (x - A[:, 1:] @ np.linalg.lstsq(A[:, 1:], x, rcond=None)[0] for x in (A[:, 0], b))
-    energy = float(model @ model)
-    if energy <= 1e-12 * float(A[:, 0] @ A[:, 0]) or not tau.any():
-        return 1.0, 0.0, braking
+    energy, whole = float(model @ model), float(A[:, 0] @ A[:, 0])
+    if energy <= 1e-12 * whole or not tau.any():
+        return _Fit()
     gain = float(model @ tau) / energy
-    return gain, gain**2 * energy / float(tau @ tau), braking
+    return _Fit(
+        gain=gain,
+        deviation=float(np.linalg.norm(tau - gain * model)) / np.sqrt(len(b) * energy),
+        explained=gain**2 * energy / float(tau @ tau),
+        braking=_braking(A, b),
+        size=float(np.sqrt(b @ b / whole)),
+        one_way=abs(float(A[:, 3].mean())) > _ONE_WAY,
+    )
 
 
 def _braking(A: Array, b: Array) -> float:
-    """Return the power of friction, A's columns 2 and 3, by its standard deviation.
-
-    It is 0 if it is a small part of the whole, or the joint moves one way.
-    """
+    """Return the power of friction, A's columns 2 and 3, by its standard deviation; 0 if small."""
     scale = np.maximum(np.abs(A).max(axis=0), 1e-300)
     inverse = np.linalg.pinv(A / scale)
     x, speed = inverse @ b, np.abs(A[:, 2])
@@ -144,8 +157,7 @@ def _braking(A: Array, b: Array) -> float:
     deviation = np.sqrt(float(left @ left) / len(b)) * float(np.linalg.norm(power @ inverse))
     spent = float(power @ x)
     small = abs(spent) < _FRICTION * float(np.abs(b * A[:, 2]).sum())
-    one_way = abs(float(A[:, 3].mean())) > _ONE_WAY  # then a constant torque is like dry friction
-    return 0.0 if small or one_way or deviation == 0.0 else spent / deviation
+    return 0.0 if small or deviation == 0.0 else spent / deviation
 
 
 def rotor_notes(left: Array, qdd: Array, noise: Array) -> tuple[str, ...]:

@@ -22,8 +22,11 @@ SHORT = (0.1, 1.0)
 
 
 def part(log: Log, duration: float) -> Log:
-    """A part of the log, from 3 s on."""
-    some = (log.t >= 3.0) & (log.t < 3.0 + duration)
+    """The part of the log in which the joint that moves least moves most."""
+    count = round(duration / (log.t[1] - log.t[0]))
+    starts = range(0, len(log.t) - count, 250)
+    first = max(starts, key=lambda k: float(np.ptp(log.q[k : k + count], axis=0).min()))
+    some = slice(first, first + count)
     assert log.tau is not None
     return Log.of(log.t[some], log.q[some], tau=log.tau[some])
 
