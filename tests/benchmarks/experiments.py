@@ -54,13 +54,15 @@ def main(first: int, last: int, duration: int) -> None:
         square = float(error @ np.linalg.solve(base.covariance, error))
         worst = max(joint.after for joint in found.joints) / TORQUE_NOISE
         short = [identify(boom, [readings_of(part(log, each))], drive_inertia=True) for each in SHORT]
-        least = min(least, *(least_eigenvalue(each) for each in (found, *short)))
+        lowest = [least_eigenvalue(each) for each in (*short, found)]
+        least = min(least, *lowest)
         within, chi, count = within + int((z < 3.0).sum()), chi + square, count + len(z)
         inside += int(square < chi2.ppf(0.9973, len(z)))
         held = max(held, worst)
         print(
             f"seed {seed}: held-out RMS at most {worst:.3f} of the noise; {int((z < 3.0).sum())} of {len(z)} within 3 sigma, "
-            f"largest {z.max():.2f}; chi-square {square:.1f}; fit {taken:.1f} s, simulation {simulated - begun:.1f} s",
+            f"largest {z.max():.2f}; chi-square {square:.1f}; least eigenvalues {', '.join(f'{x:.1e}' for x in lowest)}; "
+            f"fit {taken:.1f} s, simulation {simulated - begun:.1f} s",
             flush=True,
         )
     print(f"held-out RMS at most {held:.3f} of the noise; {within} of {count} base parameters within 3 sigma")
