@@ -44,8 +44,8 @@ costs amplitude."""
 _DIFFERENCE = 1e-6
 _SMOOTH = 0.03
 _FROM_REACH = np.radians(0.5)
-"""Unequal links do not close beyond their reach. What the optimiser tries there is given the loads of
-half a degree before it."""
+"""Unequal links do not close beyond their reach. What the optimiser tries there is given the loads
+of half a degree before it."""
 
 
 @dataclass(frozen=True, eq=False)

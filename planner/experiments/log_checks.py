@@ -105,7 +105,7 @@ def _refuse(i: int, gain: float, meant: str) -> None:
 
 
 class _Fit(NamedTuple):
-    """A joint's torques by gain tau_file + inertia qdd + viscous qd + coulomb sign(qd) + constant."""
+    """Torques by gain tau_file + inertia qdd + viscous qd + coulomb sign(qd) + constant."""
 
     gain: float = 1.0
     deviation: float = np.inf
