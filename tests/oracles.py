@@ -56,6 +56,17 @@ class OracleLoads(NamedTuple):
     """(n, 6) force and moment of the boom on the mount, in and about frame 1."""
 
 
+class ClosedLoads(NamedTuple):
+    """What the closed loop of n states needs."""
+
+    tau: Array
+    """(n, 5)"""
+    pin_7: Array
+    """(n, 3) force of the outer link on the upper one, in frame 4."""
+    mount: Array
+    """(n, 6) as in `OracleLoads`."""
+
+
 class ComMotion(NamedTuple):
     """Motion of a body over the ground, (n, 3) each, along frame 1."""
 
@@ -179,6 +190,55 @@ def mujoco_inverse_dynamics(
         row[:3] = row[:3] @ R  # a free joint's force is along the world's axes, its moment along the body's
         row[:6] -= *(now.acceleration + boom.gravity * now.up), *now.angular_acceleration
     return _closed(boom, needed)
+
+
+def mujoco_closed_loop(boom: Boom, q: Array, qd: Array, qdd: Array, base: BaseMotion | None = None) -> ClosedLoads:
+    """Loads of n states (n, 5) by Lagrange multipliers on MuJoCo's tree, for links of any lengths.
+
+    MuJoCo's Jacobians of either half of pin 7 close the loop in position (by Newton's method),
+    velocity and acceleration. The passive joints at pins 6 and 8 bear no torque, which gives the
+    force at pin 7.
+    """
+    model = mujoco_model(boom)
+    data, halves = mujoco.MjData(model), [model.site(f"pin 7 of {link}").id for link in ("upper", "outer")]
+    active, passive, G = [0, 3, 1, 5, 6], [2, 4], tree_matrix(boom)  # joints of the tree, in the order of q
+
+    def gap_jacobian() -> Array:
+        each = np.zeros((2, 3, model.nv))
+        for jacobian, site in zip(each, halves, strict=True):
+            mujoco.mj_jacSite(model, data, jacobian, None, site)
+        return np.asarray(each[0] - each[1])
+
+    tau, pin, mount = np.empty((len(q), 5)), np.zeros((len(q), 3)), np.empty((len(q), 6))
+    states = zip(q @ G.T, q, qd, qdd, instants(base, len(q)), strict=True)
+    for i, (x, at, rate, accel, now) in enumerate(states):
+        R, six = ground_axes(now.up), np.empty((2, 6))
+        xd, xdd = np.zeros(7), np.zeros(7)
+        xd[active], xdd[active] = rate, accel
+        across = R @ np.array([[np.cos(at[0]), np.sin(at[0]), 0.0], [0.0, 0.0, 1.0]]).T  # (3, 2): the arm's plane
+        for _ in range(20):
+            _mujoco_move(data, R, now, (x, xd, xdd))
+            mujoco.mj_fwdPosition(model, data)
+            J = across.T @ gap_jacobian()[:, 6:]
+            gap = across.T @ (data.site_xpos[halves[0]] - data.site_xpos[halves[1]])
+            x[passive] -= np.linalg.solve(J[:, passive], gap)
+        xd[passive] = -np.linalg.solve(J[:, passive], J[:, active] @ rate)
+        _mujoco_move(data, R, now, (x, xd, xdd))
+        mujoco.mj_inverse(model, data)
+        mujoco.mj_rnePostConstraint(model, data)
+        for site, row in zip(halves, six, strict=True):
+            mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_SITE, site, row, 0)
+        xdd[passive] = -np.linalg.solve(J[:, passive], across.T @ (six[0, 3:] - six[1, 3:]))
+        _mujoco_move(data, R, now, (x, xd, xdd))
+        mujoco.mj_inverse(model, data)
+        needed = data.qfrc_inverse.copy()
+        f7 = np.linalg.solve(J[:, passive].T, needed[6:][passive])
+        tau[i] = needed[6:][active] - J[:, active].T @ f7
+        pin[i, 0], pin[i, 2] = f7
+        needed[:3] = needed[:3] @ R
+        needed[:6] -= *(now.acceleration + boom.gravity * now.up), *now.angular_acceleration
+        mount[i] = -needed[:6]
+    return ClosedLoads(tau, pin, mount)
 
 
 def mujoco_mass_matrix(boom: Boom, q: Array) -> Array:

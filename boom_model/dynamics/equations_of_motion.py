@@ -11,7 +11,14 @@ from boom_model.arrays import Array, broadcast, checked
 from boom_model.boom import Boom
 from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.dynamics.closed_form import mass_and_bias, mass_forms
-from boom_model.dynamics.newton_euler import BASE_ENTRIES, inverse_dynamics, matched, weight_torque
+from boom_model.dynamics.newton_euler import (
+    BASE_ENTRIES,
+    element_velocities,
+    inverse_dynamics,
+    matched,
+    regrouped,
+    weight_torque,
+)
 from boom_model.kinematics.frames import body_transforms
 
 _CHUNK = 1280
@@ -30,7 +37,7 @@ def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Arr
     q = checked("q", q, 5)
     states = q.reshape(-1, 5)
     M = np.empty((len(states), 5, 5))
-    forms = mass_forms if boom.geometry.is_parallelogram else _columns
+    forms = mass_forms if boom.geometry.is_parallelogram else _by_elements
     for start in range(0, len(states), _CHUNK):
         M[start : start + _CHUNK] = forms(boom, states[start : start + _CHUNK])
     if drive_inertia:
@@ -96,7 +103,7 @@ def gravity_torque(boom: Boom, q: ArrayLike, *, base: BaseMotion | None = None) 
         InputError: q is not finite or not (..., 5).
     """
     q = checked("q", q, 5)
-    if q.ndim == 1 or not boom.geometry.is_parallelogram or (base is not None and base.moves):
+    if q.ndim == 1 or (base is not None and base.moves):
         return inverse_dynamics(boom, q, np.zeros(5), np.zeros(5), base=base, reactions=False).tau
     states, tau = q.reshape(-1, 5), np.empty((5, q.size // 5)).T
     up = None if base is None else matched("base up", base.up, q.shape[:-1])
@@ -163,9 +170,15 @@ def potential_energy(boom: Boom, q: ArrayLike, *, up: ArrayLike = (0.0, 0.0, 1.0
     return boom.gravity * np.asarray(sum(bodies[name].mass * z for name, z in heights.items()))
 
 
-def _columns(boom: Boom, q: Array) -> Array:
-    """Return M (n, 5, 5) from the torques of unit accelerations without gravity, for any linkage."""
-    return inverse_dynamics(boom, q[:, None], np.zeros(5), np.eye(5), base=_falling(boom), reactions=False).tau
+def _by_elements(boom: Boom, q: Array) -> Array:
+    """Return M (n, 5, 5) of any linkage, sum_ab db_a/dq_i . Q_ab db_b/dq_j.
+
+    The vectors b and Q are those of `newton_euler`.
+    """
+    moved = element_velocities(boom, q).transpose(3, 0, 1, 2)  # (n, 5, 3, m)
+    carried = moved @ regrouped(boom, "mass").torque_rows
+    shape = (len(q), 5, -1)
+    return np.asarray(moved.reshape(shape) @ np.swapaxes(carried.reshape(shape), -1, -2))
 
 
 def _drive_inertia(boom: Boom) -> Array:

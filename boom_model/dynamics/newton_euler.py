@@ -14,7 +14,11 @@ Newton's and Euler's equations of a set of bodies ask no more of its masses than
 U = Q A, the force on the set is U_o, and its moment about any pin a sum of b_i x U_i. The equilibrium of tool, extension,
 upper, outer, inner and lower link gives the joint torques and the pin forces from these (eqs. 2.45-2.71).
 
-All this holds for a parallelogram. Where the links are unequal, `virtual_work` takes its place.
+Where opposite links are unequal, the upper link turns at psi and the outer one at chi (see
+`linkage`). Then psi stands in the place of theta3 above, and four vectors more are needed: el, pl
+of the lower link at theta3, and eo, po of the outer one at chi. The torque of theta2 is the sum of
+the torques at theta2, psi and chi, each times the derivative of its angle by theta2; that of theta3
+likewise.
 """
 
 from collections.abc import Sequence
@@ -27,11 +31,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from boom_model.arrays import Array, broadcast, checked, read_only
-from boom_model.boom import Body, Boom
+from boom_model.boom import Body, Boom, Geometry
 from boom_model.dynamics.base_motion import BaseMotion
-from boom_model.dynamics.virtual_work import balance
 from boom_model.errors import InputError
 from boom_model.kinematics.frames import R_LINK_BODY
+from boom_model.kinematics.linkage import Loop, Value, solved_loop
 from boom_model.trigonometry import cosine_and_sine
 
 PayloadAs = Literal["mass", "force"]
@@ -41,11 +45,12 @@ _CHUNK = 1280
 its products on one thread: a second one gains nothing on so thin a matrix, and waits for its turn
 on a busy machine."""
 
-_O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT = range(11)  # the vectors b
+_O, _X, _Z, _N, _E2, _P2, _E3, _P3, _RHO, _ET, _PT, _EL, _PL, _EO, _PO = range(15)
+"""The vectors b; the last four are those of a linkage of unequal links alone."""
 _ONE = (5,)
 _NOTHING = (0.0, 0.0, 0.0)
 BASE_ENTRIES = ("angular_velocity", "angular_acceleration", "acceleration", "up")
-_LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT))
+_LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT), (_EL, _PL), (_EO, _PO))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +58,8 @@ class PinForces:
     """Forces at the linkage's pins [N], each (..., 3) in frame 4: x forward, y to the left, z up, yawing with theta1.
 
     They lie in the arm's plane: how pins 7 and 8 share the load across it is statically indeterminate, so y is 0. They grow
-    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right: see `transmission_angle`.
+    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right, and as
+    1/sin(chi - psi) where links are unequal: see `transmission_angle`.
     """
 
     frame_6: Array
@@ -139,18 +145,15 @@ def inverse_dynamics(
         np.zeros((3, 3, count)).swapaxes(1, 2) if reactions else None,
         np.empty((6, count)).T if reactions else None,
     )
-    model = regrouped(boom, payload_as) if boom.geometry.is_parallelogram else None
+    model = regrouped(boom, payload_as)
     rotors = boom.drive_inertia if drive_inertia else None
 
     def fill(motion: list[Array], outside: list[Array], push: Array | None, twist: Array | None, out: _Outputs) -> None:
-        if model is None:
-            _by_virtual_work(boom, motion, outside, payload_as, [push, twist], out)
-        else:
-            state = _state(motion)
-            plane = _plane(boom, state, *map(_columns, outside))
-            force = None if push is None else _into_plane(state, _columns(push))
-            moment = None if twist is None else _into_plane(state, _columns(twist))
-            _newton_euler(model, state, plane, force, moment, out)
+        state = _state(motion)
+        plane = _plane(boom, state, *map(_columns, outside))
+        force = None if push is None else _into_plane(state, _columns(push))
+        moment = None if twist is None else _into_plane(state, _columns(twist))
+        _newton_euler(model, state, plane, force, moment, out)
         if friction:
             out.tau[:] += boom.friction.torque(motion[1])
         if rotors is not None:
@@ -170,7 +173,7 @@ def inverse_dynamics(
 
 
 def weight_torque(boom: Boom, q: Array, up: Array | None = None) -> Array:
-    """Return the torque (n, 5) that carries bodies and payload at rest, for a parallelogram.
+    """Return the torque (n, 5) that carries bodies and payload at rest.
 
     Without motion, A is minus gravity for the origin o and 0 for every other vector b.
 
@@ -183,9 +186,8 @@ def weight_torque(boom: Boom, q: Array, up: Array | None = None) -> Array:
     x, z, n = (0.0, boom.gravity, 0.0) if up is None else (boom.gravity * a for a in _into_plane(state, list(up.T)))
     Q = regrouped(boom, "mass").torque_rows[:, _O].tolist()
     U = tuple([moment * along for moment in Q] for along in (x, z, n))
-    _, q2, q3, q4, q5 = state.q
-    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q2), cosine_and_sine(q3), cosine_and_sine(q3 + q5)
-    torques, _ = _torques(boom.geometry.L7 + q4, (c2, c3, ct), (s2, s3, st), U, _NOTHING)
+    links, loop = _turns(boom.geometry, state)
+    torques = _torques(boom.geometry.L7 + state.q[3], links, loop, U, _NOTHING).tau
     tau = np.empty((5, len(q)))
     for row, torque in zip(tau, torques, strict=True):
         row[:] = torque
@@ -216,32 +218,51 @@ def base_series(base: BaseMotion | None, shape: tuple[int, ...]) -> list[Array]:
 
 
 def element_accelerations(boom: Boom, q: Array, qd: Array, qdd: Array, *base: Array) -> Array:
-    """Return A (3, 11, n) of n states (n, 5) along x, z and n, on a base moved as `base_series` says."""
+    """Return A (3, m, n) of the m vectors b at n states (n, 5) along x, z and n.
+
+    The base moves as `base_series` says.
+
+    Raises:
+        InfeasibleError: a linkage of unequal links cannot close at q.
+    """
     state = _State(*(list(np.ascontiguousarray(x.T)) for x in (q, qd, qdd)))
-    (c2, s2), (c3, s3), (ct, st) = (cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
     plane = _plane(boom, state, *(list(x.T) for x in base))
-    return np.asarray(_accelerations(state, plane, (c2, c3, ct), (s2, s3, st), boom.geometry.L7 + q[:, 3]))
+    links, _ = _turns(boom.geometry, state)
+    return np.asarray(_accelerations(state, plane, links, boom.geometry.L7 + q[:, 3]))
 
 
 def element_velocities(boom: Boom, q: Array) -> Array:
-    """Return db/dq (5, 3, 11, n) of every joint and vector b at n states (n, 5), along x, z and n.
+    """Return db/dq (5, 3, m, n) of every joint and vector b at n states (n, 5), along x, z and n.
 
     Yaw turns the plane about z: x goes to -n, n to x. An angle turns its links' e to p, and p to
     -e.
+
+    Raises:
+        InfeasibleError: a linkage of unequal links cannot close at q.
     """
-    (c2, s2), (c3, s3), (ct, st) = (cosine_and_sine(angle) for angle in (q[:, 1], q[:, 2], q[:, 2] + q[:, 4]))
-    rho = boom.geometry.L7 + q[:, 3]
-    moved = np.zeros((5, 3, 11, len(q)))
+    columns, still = list(np.ascontiguousarray(q.T)), [np.zeros(len(q))] * 5
+    links, loop = _turns(boom.geometry, _State(columns, still, still))
+    rho, (c3, s3) = boom.geometry.L7 + q[:, 3], (links[1].c, links[1].s)
+    by: tuple[dict[int, Value], ...]  # the joint's derivative of the angle of each link
+    if loop is None:
+        by = ({}, {0: 1.0}, {1: 1.0, 2: 1.0}, {}, {2: 1.0})
+    else:
+        (psi_2, psi_3), (chi_2, chi_3) = loop.upper_by, loop.outer_by
+        by = ({}, {0: 1.0, 1: psi_2, 2: psi_2, 4: chi_2}, {1: psi_3, 2: psi_3, 3: 1.0, 4: chi_3}, {}, {2: 1.0})
+    moved = np.zeros((5, 3, _count(boom.geometry), len(q)))
     moved[0, 0, _N] = 1.0
     moved[0, 2, _X] = -1.0
-    for joints, (e, p), c, s in (((1,), _LINKS[0], c2, s2), ((2,), _LINKS[1], c3, s3), ((2, 4), _LINKS[2], ct, st)):
-        moved[0, 2, e], moved[0, 2, p] = -c, s
-        for joint in joints:
-            moved[joint, 0, e], moved[joint, 1, e] = -s, c
-            moved[joint, 0, p], moved[joint, 1, p] = -c, -s
     moved[0, 2, _RHO] = -rho * c3
-    moved[2, 0, _RHO], moved[2, 1, _RHO] = -rho * s3, rho * c3
     moved[3, 0, _RHO], moved[3, 1, _RHO] = c3, s3
+    for i, ((e, p), link) in enumerate(zip(_LINKS, links, strict=False)):
+        moved[0, 2, e], moved[0, 2, p] = -link.c, link.s
+        for joint, turned in enumerate(by):
+            if i in turned:
+                along, across = turned[i] * link.c, turned[i] * link.s
+                moved[joint, 0, e], moved[joint, 1, e] = -across, along
+                moved[joint, 0, p], moved[joint, 1, p] = -along, -across
+                if i == 1:
+                    moved[joint, 0, _RHO], moved[joint, 1, _RHO] = -rho * across, rho * along
     return moved
 
 
@@ -250,14 +271,14 @@ class Regrouped(NamedTuple):
 
     boom: Boom
     rows: Array
-    """(17, 11): Q of all bodies; then Q of the outer link (o, e2, p2) and of all beyond pins 7 and
-    8 (o, e3, p3)."""
+    """(m + 6, m), of m vectors b: Q of all bodies; then Q of the outer link (o, e2, p2) and of all
+    beyond pins 7 and 8 (o, e3, p3)."""
     torque_rows: Array
-    """(11, 11): Q of all bodies alone."""
+    """(m, m): Q of all bodies alone."""
     tip: Array
-    """(11,) g of the tip."""
+    """(m,) g of the tip."""
     payload: Array
-    """(11,) g of the payload's centre of mass."""
+    """(m,) g of the payload's centre of mass."""
     hanging: float
     """Payload that is a force [kg]."""
 
@@ -268,10 +289,12 @@ def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
     elements = body_elements(boom)
     bodies = {**boom.bodies, "payload": boom.payload}
     Q = {name: elements[name].T @ _pseudo_inertia(body, R_LINK_BODY[name]) @ elements[name] for name, body in bodies.items()}
+    none = np.zeros((_count(boom.geometry), _count(boom.geometry)))
     if payload_as == "force":
-        Q["payload"] = np.zeros((11, 11))
-    top = sum((Q[name] for name in ("upper", "extension", "end_effector", "payload")), np.zeros((11, 11)))
-    rows = [sum(Q.values(), np.zeros((11, 11))), Q["outer"][[_O, _E2, _P2]], top[[_O, _E3, _P3]]]
+        Q["payload"] = none
+    top = sum((Q[name] for name in ("upper", "extension", "end_effector", "payload")), none)
+    outer = (_E2, _P2) if boom.geometry.is_parallelogram else (_EO, _PO)
+    rows = [sum(Q.values(), none), Q["outer"][[_O, *outer]], top[[_O, _E3, _P3]]]
     com = R_LINK_BODY["payload"] @ boom.payload.com
     return Regrouped(
         boom=boom,
@@ -284,23 +307,29 @@ def regrouped(boom: Boom, payload_as: PayloadAs) -> Regrouped:
 
 
 def body_elements(boom: Boom) -> dict[str, Array]:
-    """Return g of each body's frame origin, and its change per metre along e, p and n, (4, 11)."""
-    g, unit = boom.geometry, np.eye(11)
+    """Return g of each body's frame origin, and its change per metre along e, p and n, (4, m)."""
+    g, unit = boom.geometry, np.eye(_count(boom.geometry))
+    lower, outer = ((_E3, _P3), (_E2, _P2)) if g.is_parallelogram else ((_EL, _PL), (_EO, _PO))
     shoulder = unit[_O] + g.L2 * unit[_X] + g.L1 * unit[_Z]
-    pin6 = shoulder + g.L3 * unit[_E3]
+    pin6 = shoulder + g.L3 * unit[lower[0]]
     pin8 = shoulder + g.L9 * unit[_E2]
     wrist = pin8 - g.L6 * unit[_P3] - unit[_RHO]
     placed = {
         "base": (unit[_O], _X, _Z),
-        "lower": (shoulder, _E3, _P3),
+        "lower": (shoulder, *lower),
         "inner": (shoulder, _E2, _P2),
-        "outer": (pin6, _E2, _P2),
+        "outer": (pin6, *outer),
         "upper": (pin8, _E3, _P3),
         "extension": (wrist, _E3, _P3),
         "end_effector": (wrist, _ET, _PT),
         "payload": (wrist + g.L8 * unit[_PT], _ET, _PT),
     }
     return {name: np.stack([origin, unit[e], unit[p], unit[_N]]) for name, (origin, e, p) in placed.items()}
+
+
+def _count(g: Geometry) -> int:
+    """Return m, the number of the vectors b."""
+    return 11 if g.is_parallelogram else 15
 
 
 def _pseudo_inertia(body: Body, R: Array) -> Array:
@@ -313,10 +342,6 @@ def _pseudo_inertia(body: Body, R: Array) -> Array:
     return moments
 
 
-_Value = Array | float
-"""(n,) of a chunk, or the number of a single state: Python's own arithmetic is ten times quicker on
-it than NumPy's."""
-
 _Rows = Array | list[list[float]]
 """Values of vectors along x, z and n: an array (3, k, n), or three lists of k numbers of a single
 state."""
@@ -325,9 +350,9 @@ state."""
 class _State(NamedTuple):
     """A chunk of states, each five values."""
 
-    q: Sequence[_Value]
-    qd: Sequence[_Value]
-    qdd: Sequence[_Value]
+    q: Sequence[Value]
+    qd: Sequence[Value]
+    qdd: Sequence[Value]
 
 
 def _state(motion: list[Array]) -> _State:
@@ -337,12 +362,12 @@ def _state(motion: list[Array]) -> _State:
     return _State(*(list(np.ascontiguousarray(x.T)) for x in motion))
 
 
-def _columns(vectors: Array) -> Sequence[_Value]:
+def _columns(vectors: Array) -> Sequence[Value]:
     """Return x, y and z of vectors (n, 3)."""
     return vectors[0].tolist() if len(vectors) == 1 else list(vectors.T)
 
 
-_Vector = tuple[_Value, _Value, _Value]
+_Vector = tuple[Value, Value, Value]
 """Along the axes x, z and n of the arm's plane."""
 
 
@@ -375,23 +400,6 @@ class _Outputs(NamedTuple):
         )
 
 
-def _by_virtual_work(
-    boom: Boom,
-    motion: Sequence[Array],
-    outside: Sequence[Array],
-    payload_as: PayloadAs,
-    applied: Sequence[Array | None],
-    out: _Outputs,
-) -> None:
-    """Fill the outputs of a chunk where the linkage is no parallelogram."""
-    base = BaseMotion.of(**dict(zip(BASE_ENTRIES, outside, strict=True))) if outside else BaseMotion.of()
-    q, qd, qdd = motion
-    found = balance(boom, q, qd, qdd, base, payload_as_force=payload_as == "force", tip_force=applied[0], tip_moment=applied[1])
-    out.tau[:] = found.tau
-    if out.pins is not None and out.mount is not None:
-        out.pins[:], out.mount[:] = found.pins, found.mount
-
-
 def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
     """Return checked vectors (n, 3) for the n states of a shape.
 
@@ -405,13 +413,13 @@ def matched(name: str, values: ArrayLike, shape: tuple[int, ...]) -> Array:
         raise InputError(f"{name} has shape {values.shape}; it does not match states of shape {(*shape, 5)}") from None
 
 
-def _into_plane(state: _State, vector: Sequence[_Value]) -> _Vector:
+def _into_plane(state: _State, vector: Sequence[Value]) -> _Vector:
     """Return the components of a vector, given along frame 1, along x, z and n of the plane."""
     c, s = cosine_and_sine(state.q[0])
     return c * vector[0] + s * vector[1], vector[2], s * vector[0] - c * vector[1]
 
 
-def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
+def _plane(boom: Boom, state: _State, *base: Sequence[Value]) -> _Plane:
     rate, accel = state.qd[0], state.qdd[0]
     if not base:
         level = (0.0, boom.gravity, 0.0)
@@ -426,21 +434,47 @@ def _plane(boom: Boom, state: _State, *base: Sequence[_Value]) -> _Plane:
     return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1), False)
 
 
-def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value], rho: _Value) -> _Rows:
+class _Turn(NamedTuple):
+    """How a link at an angle turns in the arm's plane."""
+
+    c: Value
+    s: Value
+    rate: Value
+    accel: Value
+
+
+def _turns(g: Geometry, state: _State) -> tuple[tuple[_Turn, ...], Loop | None]:
+    """Return the turning of each pair of _LINKS, and the loop unless it is a parallelogram.
+
+    Raises:
+        InfeasibleError: the linkage cannot close.
+    """
+    q, qd, qdd = state
+    inner, lower = _Turn(*cosine_and_sine(q[1]), qd[1], qdd[1]), _Turn(*cosine_and_sine(q[2]), qd[2], qdd[2])
+    if g.is_parallelogram:
+        return (inner, lower, _Turn(*cosine_and_sine(q[2] + q[4]), qd[2] + qd[4], qdd[2] + qdd[4])), None
+    loop = solved_loop(g, (inner.c, inner.s), (lower.c, lower.s))
+    both = loop.rates(qd[1], qd[2]), loop.accelerations((qd[1], qd[2]), qdd[1], qdd[2])
+    upper, outer = (_Turn(*unit, both[0][i], both[1][i]) for i, unit in enumerate((loop.upper, loop.outer)))
+    c, s = cosine_and_sine(q[4])
+    tool = _Turn(upper.c * c - upper.s * s, upper.s * c + upper.c * s, upper.rate + qd[4], upper.accel + qdd[4])
+    return (inner, upper, tool, lower, outer), loop
+
+
+def _accelerations(state: _State, plane: _Plane, links: Sequence[_Turn], rho: Value) -> _Rows:
     """Return A, the acceleration of each vector b, along x, z and n.
 
-    It is an array (3, 11, n), or three lists for a single state.
-
-    C, S: cosine and sine of theta2, theta3 and theta3 + theta5.
+    It is an array (3, m, n), or three lists for a single state.
     """
-    A: Any = [[0.0] * 11, [0.0] * 11, [0.0] * 11] if isinstance(rho, float) else np.empty((3, 11, *rho.shape))
+    count = 5 + 2 * len(links)
+    A: Any = [[0.0] * count for _ in range(3)] if isinstance(rho, float) else np.empty((3, count, *rho.shape))
     Ax, Az, An = A
     if plane.level:
-        _fill_level(A, state, plane, C, S)
+        _fill_level(A, plane, links)
     else:
-        _fill_moving(A, state, plane, C, S)
-    c, s, slide = C[1], S[1], 2.0 * state.qd[3]
-    turning = slide * (state.qd[2] + plane.W[2])
+        _fill_moving(A, plane, links)
+    (c, s, rate, _), slide = links[1], 2.0 * state.qd[3]
+    turning = slide * (rate + plane.W[2])
     Ax[_RHO] = rho * Ax[_E3] + (state.qdd[3] * c - turning * s)
     Az[_RHO] = rho * Az[_E3] + (state.qdd[3] * s + turning * c)
     across = plane.W[1] * c if plane.level else plane.W[1] * c - plane.W[0] * s
@@ -449,7 +483,7 @@ def _accelerations(state: _State, plane: _Plane, C: Sequence[_Value], S: Sequenc
     return rows
 
 
-def _fill_level(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value]) -> None:
+def _fill_level(A: Any, plane: _Plane, links: Sequence[_Turn]) -> None:
     """Fill A but for rho e3 with a base at rest: the plane turns about z alone."""
     Ax, Az, An = A
     w, d = plane.W[1], plane.W1[1]
@@ -458,9 +492,7 @@ def _fill_level(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Se
     Ax[_X], Az[_X], An[_X] = -square, 0.0, -d
     Ax[_Z], Az[_Z], An[_Z] = 0.0, 0.0, 0.0
     Ax[_N], Az[_N], An[_N] = d, 0.0, -square
-    qd, qdd = state.qd, state.qdd
-    rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
-    for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
+    for (e, p), (c, s, rate, accel) in zip(_LINKS, links, strict=False):
         along_z = rate * rate
         along_x, m = along_z + square, 2.0 * rate * w
         Ax[e] = -along_x * c - accel * s
@@ -471,7 +503,7 @@ def _fill_level(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Se
         An[p] = m * c + d * s
 
 
-def _fill_moving(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: Sequence[_Value]) -> None:
+def _fill_moving(A: Any, plane: _Plane, links: Sequence[_Turn]) -> None:
     """Fill A but for rho e3."""
     Ax, Az, An = A
     w1, w2, w3 = plane.W
@@ -481,9 +513,7 @@ def _fill_moving(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: S
     Ax[_X], Az[_X], An[_X] = -(w22 + w33), w12 + d3, w13 - d2
     Ax[_Z], Az[_Z], An[_Z] = w12 - d3, -(w11 + w33), w23 + d1
     Ax[_N], Az[_N], An[_N] = w13 + d2, w23 - d1, -(w11 + w22)
-    qd, qdd = state.qd, state.qdd
-    rates, accels = (qd[1], qd[2], qd[2] + qd[4]), (qdd[1], qdd[2], qdd[2] + qdd[4])
-    for (e, p), c, s, rate, accel in zip(_LINKS, C, S, rates, accels, strict=True):
+    for (e, p), (c, s, rate, accel) in zip(_LINKS, links, strict=False):
         total, double = rate + w3, 2.0 * rate
         square = total * total
         along_x, along_z = square + w22, square + w11
@@ -497,36 +527,50 @@ def _fill_moving(A: Any, state: _State, plane: _Plane, C: Sequence[_Value], S: S
         An[p] = m * c - k * s
 
 
-def _torques(
-    rho: _Value, C: Sequence[_Value], S: Sequence[_Value], U: Any, moment: _Vector
-) -> tuple[tuple[_Value, ...], _Value]:
-    """Return the joint torques, and the moment of all beyond the actuator about its axis.
+class _Torques(NamedTuple):
+    """Joint torques, and moments that pins and mount ask for."""
 
-    U: along x, z and n.
-    """
+    tau: tuple[Value, ...]
+    beyond_actuator: Value
+    """Moment of all beyond the actuator about its pin."""
+    in_plane: Value
+    """Sum of the torques on all links in the arm's plane."""
+
+
+def _torques(rho: Value, links: Sequence[_Turn], loop: Loop | None, U: Any, moment: _Vector) -> _Torques:
+    """Return the joint torques; U is along x, z and n."""
     Ux, Uz, Un = U
-    (c2, c3, ct), (s2, s3, st) = C, S
-    on_tool = _about(ct, st, Ux, Uz, _ET, _PT) - moment[2]
+    c3, s3, _, _ = links[1]
+    on_links = [_about(link, Ux, Uz, e, p) for (e, p), link in zip(_LINKS, links, strict=False)]
+    on_tool = on_links[2] - moment[2]
     beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
     # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
-    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
+    reach = rho * c3 * Un[_RHO]
+    for (e, p), (c, s, _, _) in zip(_LINKS, links, strict=False):
+        reach = reach + (c * Un[e] - s * Un[p])
     tau_1 = Ux[_N] - Un[_X] - reach - moment[1]
-    tau_2 = _about(c2, s2, Ux, Uz, _E2, _P2)
-    tau_3 = _about(c3, s3, Ux, Uz, _E3, _P3) + beyond_actuator
+    tau_2, tau_3 = on_links[0], on_links[1] + beyond_actuator
+    in_plane = tau_2 + tau_3
+    if loop is not None:
+        at_psi, (lower, outer) = tau_3, on_links[3:]
+        in_plane = in_plane + lower + outer
+        tau_2 = tau_2 + loop.upper_by[0] * at_psi + loop.outer_by[0] * outer
+        tau_3 = lower + loop.upper_by[1] * at_psi + loop.outer_by[1] * outer
     tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
-    return (tau_1, tau_2, tau_3, tau_4, on_tool), beyond_actuator
+    return _Torques((tau_1, tau_2, tau_3, tau_4, on_tool), beyond_actuator, in_plane)
 
 
-def _about(c: _Value, s: _Value, Ux: Sequence[_Value], Uz: Sequence[_Value], e: int, p: int) -> _Value:
+def _about(link: _Turn, Ux: Sequence[Value], Uz: Sequence[Value], e: int, p: int) -> Value:
     """Return (b_e x U_e + b_p x U_p) . n."""
-    return c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
+    c, s, _, _ = link
+    turned: Value = c * (Uz[e] - Ux[p]) - s * (Ux[e] + Uz[p])
+    return turned
 
 
 def _single(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array | None:
     """Return the torques (5,) of one state on level ground, without the preparations for many.
 
-    None for a linkage that is no parallelogram, and for other inputs than three finite arrays
-    (5,).
+    None for other inputs than three finite arrays (5,).
     """
     numbers = []
     for x in (q, qd, qdd):
@@ -534,15 +578,12 @@ def _single(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array | 
             return None
         numbers.append(x.tolist())
     state = _State(*numbers)
-    if not (isfinite(sum(state.q) + sum(state.qd) + sum(state.qdd)) and boom.geometry.is_parallelogram):
+    if not isfinite(sum(state.q) + sum(state.qd) + sum(state.qdd)):
         return None
-    _, q2, q3, q4, q5 = state.q
-    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q2), cosine_and_sine(q3), cosine_and_sine(q3 + q5)
-    rho, C, S = boom.geometry.L7 + q4, (c2, c3, ct), (s2, s3, st)
-    x, z, n = _accelerations(state, _plane(boom, state), C, S, rho)
-    U = np.array(x + z + n).reshape(3, 11).dot(regrouped(boom, "mass").torque_rows.T).tolist()
-    tau, _ = _torques(rho, C, S, U, _NOTHING)
-    return np.array(tau)
+    rho, (links, loop) = boom.geometry.L7 + state.q[3], _turns(boom.geometry, state)
+    x, z, n = _accelerations(state, _plane(boom, state), links, rho)
+    U = np.array(x + z + n).reshape(3, len(x)).dot(regrouped(boom, "mass").torque_rows.T).tolist()
+    return np.array(_torques(rho, links, loop, U, _NOTHING).tau)
 
 
 def _newton_euler(
@@ -550,12 +591,10 @@ def _newton_euler(
 ) -> None:
     """Fill the outputs of a chunk, with a force and a moment on the tip."""
     g, q = model.boom.geometry, state.q
-    rho = g.L7 + q[3]
-    (c2, s2), (c3, s3), (ct, st) = cosine_and_sine(q[1]), cosine_and_sine(q[2]), cosine_and_sine(q[2] + q[4])
-    C, S = (c2, c3, ct), (s2, s3, st)
-    A = _accelerations(state, plane, C, S, rho)
+    rho, (links, loop), count = g.L7 + q[3], _turns(g, state), _count(g)
+    A = _accelerations(state, plane, links, rho)
     rows = model.rows if out.pins is not None else model.torque_rows
-    U = np.array(A[0] + A[1] + A[2]).reshape(3, 11).dot(rows.T) if isinstance(A, list) else rows @ A
+    U = np.array(A[0] + A[1] + A[2]).reshape(3, count).dot(rows.T) if isinstance(A, list) else rows @ A
     if model.hanging:
         _put_on(
             U, model.payload, (-model.hanging * plane.lift[0], -model.hanging * plane.lift[1], -model.hanging * plane.lift[2])
@@ -565,8 +604,7 @@ def _newton_euler(
     moment = _NOTHING if moment is None else moment
     U = U.tolist() if isinstance(A, list) else U
     Ux, Uz, Un = U
-    tau, beyond_actuator = _torques(rho, C, S, U, moment)
-    tau_1, tau_2, tau_3, *_ = tau
+    tau, beyond_actuator, in_plane = _torques(rho, links, loop, U, moment)
     if isinstance(A, list):
         out.tau[0] = tau
     else:
@@ -575,35 +613,41 @@ def _newton_euler(
     if out.pins is None or out.mount is None:
         return
 
-    # Pin 7 lies L5 along the lower link's direction from pin 8, and L4 along the inner link's from
+    # Pin 7 lies L5 along the upper link's direction from pin 8, and L4 along the outer link's from
     # pin 6: the moments about pins 8 and 6 give the force at pin 7 across both directions, and the
     # balance of forces the other two.
-    M_outer = _about(c2, s2, Ux, Uz, 12, 13)
-    M_top = _about(c3, s3, Ux, Uz, 15, 16) + beyond_actuator
-    sine = s3 * c2 - c3 * s2
+    outer_link = links[0] if loop is None else links[4]
+    (c3, s3, _, _), (c4, s4, _, _) = links[1], outer_link
+    M_outer = _about(outer_link, Ux, Uz, count + 1, count + 2)
+    M_top = _about(links[1], Ux, Uz, count + 4, count + 5) + beyond_actuator
+    sine = s3 * c4 - c3 * s4
     with np.errstate(divide="ignore", invalid="ignore"):
-        along_inner, along_lower = np.divide(-M_top, g.L5 * sine), np.divide(-M_outer, g.L4 * sine)
-        f7x, f7z = along_inner * c2 + along_lower * c3, along_inner * s2 + along_lower * s3
-    for pin, x, z in ((0, Ux[11] + f7x, Uz[11] + f7z), (1, f7x, f7z), (2, Ux[14] - f7x, Uz[14] - f7z)):
+        along_outer, along_upper = np.divide(-M_top, g.L5 * sine), np.divide(-M_outer, g.L4 * sine)
+        f7x, f7z = along_outer * c4 + along_upper * c3, along_outer * s4 + along_upper * s3
+    forces = ((Ux[count] + f7x, Uz[count] + f7z), (f7x, f7z), (Ux[count + 3] - f7x, Uz[count + 3] - f7z))
+    for pin, (x, z) in enumerate(forces):
         out.pins[pin, :, 0], out.pins[pin, :, 2] = x, z
 
-    rise = (s2 * Un[_E2] + c2 * Un[_P2]) + (s3 * Un[_E3] + c3 * Un[_P3]) + rho * s3 * Un[_RHO] + (st * Un[_ET] + ct * Un[_PT])
+    rise = rho * s3 * Un[_RHO]
+    for (e, p), (c, s, _, _) in zip(_LINKS, links, strict=False):
+        rise = rise + (s * Un[e] + c * Un[p])
     Mx = Un[_Z] - Uz[_N] + rise - moment[0]
-    Mn = Uz[_X] - Ux[_Z] + tau_2 + tau_3
+    Mn = Uz[_X] - Ux[_Z] + in_plane
     c1, s1 = cosine_and_sine(q[0])
     mount = out.mount
     for row, along, normal in ((0, Ux[_O], Un[_O]), (3, Mx, Mn)):
         mount[:, row] = -(c1 * along + s1 * normal)
         mount[:, row + 1] = -(s1 * along - c1 * normal)
     mount[:, 2] = -Uz[_O]
-    mount[:, 5] = -tau_1
+    mount[:, 5] = -tau[0]
 
 
 def _put_on(U: Array, g: Array, force: _Vector) -> None:
     """Take a force at the point g off what the bodies need, in place."""
+    count = len(g)
     for row, along in zip(U, force, strict=True):
         taken = np.multiply.outer(g, along)
         taken = taken if taken.ndim == row.ndim else taken[:, None]  # the same force in every state
-        row[:11] -= taken
-        if len(row) > 11:
-            row[14:] -= taken[[_O, _E3, _P3]]
+        row[:count] -= taken
+        if len(row) > count:
+            row[count + 3 :] -= taken[[_O, _E3, _P3]]

@@ -26,6 +26,8 @@ On a base at rest 29 combinations of the 70 parameters (the payload's belong to 
     7  products with the normal of the arm's plane
 
 A base that tilts and turns shows 6 more: the yawing body's first moments across its axis, and the rest of its inertia.
+Unequal links show 8 more, weakly, because the lower and the outer link no longer turn with the
+upper and the inner one.
 """
 
 import numpy as np
@@ -61,9 +63,9 @@ def regressor(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, base: 
         base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level ground.
 
     Raises:
-        InputError: as `inverse_dynamics`, or the linkage is no parallelogram.
+        InputError: as `inverse_dynamics`.
+        InfeasibleError: a linkage of unequal links cannot close at q.
     """
-    boom.geometry.require_parallelogram("the regressor")
     positions, rates, accelerations = broadcast(q=q, qd=qd, qdd=qdd)
     shape = positions.shape[:-1]
     motion = [np.reshape(x, (-1, 5)) for x in (positions, rates, accelerations)]
@@ -72,10 +74,10 @@ def regressor(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, base: 
     for start in range(0, len(Y), _CHUNK):
         part = slice(start, start + _CHUNK)
         state = [x[part] for x in motion]
-        A = element_accelerations(boom, *state, *(x[part] for x in outside)).transpose(2, 0, 1)  # (n, 3, 11)
-        moved = element_velocities(boom, state[0]).transpose(3, 0, 2, 1)  # (n, 5, 11, 3)
-        work = moved.reshape(len(A), 55, 3) @ A
-        Y[part] = work.reshape(len(A), 5, 121) @ grouped
+        A = element_accelerations(boom, *state, *(x[part] for x in outside)).transpose(2, 0, 1)  # (n, 3, m)
+        moved = element_velocities(boom, state[0]).transpose(3, 0, 2, 1)  # (n, 5, m, 3)
+        work = moved.reshape(len(A), -1, 3) @ A
+        Y[part] = work.reshape(len(A), 5, -1) @ grouped
     return Y.reshape(*shape, *Y.shape[1:])
 
 
@@ -128,7 +130,7 @@ def body_of_pseudo_inertia(P: Array) -> Body:
 
 
 def _grouped(boom: Boom) -> Array:
-    """Return what each parameter adds to int g g^T dm of `newton_euler`, flattened: (121, 80)."""
+    """Return what each parameter adds to int g g^T dm of `newton_euler`, flattened: (m^2, 80)."""
     along_link, P = body_elements(boom), pseudo_inertia_of_parameters(np.eye(10))
     columns = []
     for name in REGRESSOR_BODIES:

@@ -18,7 +18,7 @@ from boom_model.boom import Boom
 from boom_model.dynamics.base_motion import BaseMotion
 from boom_model.errors import InputError
 from boom_model.kinematics.frames import BODY_FRAMES, SLIDING_ROW, Loop, frame_transforms, theta_motion
-from boom_model.kinematics.linkage import accelerations, rates, require_closed
+from boom_model.kinematics.linkage import accelerations, directions, rates, require_closed
 from boom_model.trigonometry import cosine_and_sine
 
 
@@ -183,16 +183,23 @@ def manipulability(boom: Boom, q: ArrayLike) -> Array:
     return measure
 
 
-def transmission_angle(q: ArrayLike) -> Array:
-    """Return the acute angle (...) between the inner and the lower link [rad].
+def transmission_angle(boom: Boom, q: ArrayLike) -> Array:
+    """Return the acute angle (...) between the outer and the upper link, at pin 7 [rad].
 
-    The parallelogram is flat at 0 and rectangular at pi/2.
+    Pin forces grow as the inverse of its sine. In a parallelogram it is that between the inner and
+    the lower link: 0 where the linkage is flat, pi/2 where it is rectangular.
 
     Raises:
         InputError: q is not finite or not (..., 5).
+        InfeasibleError: a linkage of unequal links cannot close at q.
     """
     q = checked("q", q, 5)
-    _, sine = cosine_and_sine(q[..., 2] - q[..., 1])
+    if boom.geometry.is_parallelogram:
+        _, sine = cosine_and_sine(q[..., 2] - q[..., 1])
+    else:
+        at = directions(boom, q[..., 1], q[..., 2])
+        require_closed(boom, q)
+        sine = np.sin(at.upper - at.outer)
     angle: Array = np.arcsin(np.minimum(np.abs(sine), 1.0))
     return angle
 

@@ -106,10 +106,11 @@ def _position_rows(evaluation: Evaluation, i: int) -> Iterator[Row]:
     )
     if JOINTS[i] != "lower":
         return
+    transmitted = transmission_angle(evaluation.boom, motion.q)
     for kind, angle, bound, origin in (
         (CheckKind.LINKAGE, motion.q[:, 2] - motion.q[:, 1], limits.linkage, limits.origins["linkage"][0]),
-        # pin forces grow as the parallelogram becomes flat
-        (CheckKind.TRANSMISSION_ANGLE, transmission_angle(motion.q), limits.transmission, limits.origins["transmission"][0]),
+        # pin forces grow as the linkage becomes flat
+        (CheckKind.TRANSMISSION_ANGLE, transmitted, limits.transmission, limits.origins["transmission"][0]),
     ):
         at = int(np.argmin(angle))
         room = angle[at] - bound

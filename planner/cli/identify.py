@@ -98,7 +98,7 @@ def identify(
         raise InputError("--csv, --record and --period belong to --design")
     files, boom = outputs(out, inputs=(*logs, boom_file)), load_boom(boom_file, payload)
     constants = None if torque_per_ampere is None else _five(torque_per_ampere)
-    read = [_readings(name, constants, cutoff) for name in logs]
+    read = [_readings(boom, name, constants, cutoff) for name in logs]
     inertia = drive_inertia or constants is not None
     asked = _Asked(boom, read, inertia, files, out, boom_file, ", ".join(logs), as_json, whole)
     return _payload(asked) if payload_only else _dynamics(asked)
@@ -137,7 +137,7 @@ def _five(text: str) -> list[float]:
     return values
 
 
-def _readings(name: str, constants: list[float] | None, cutoff: float | None) -> "Readings":
+def _readings(boom: Boom, name: str, constants: list[float] | None, cutoff: float | None) -> "Readings":
     from planner.experiments.readings import read_torque_log, readings_of
 
     log = read_torque_log(name, constants)
@@ -181,7 +181,7 @@ def _print_dynamics(answer: dict[str, Any], logs: str, payload: float, whole: bo
         print_rows(("parameter", "value", "+-", "file"), _cells(answer["parameters"]))
         print_lines("note", answer["notes"])
     else:
-        shown = [note for note in answer["notes"] if "stamped" in note]
+        shown = [note for note in answer["notes"] if "stamped" in note or "unexplained" in note]
         print_lines("note", shown)
         print_lines(None, [f"{len(answer['notes'])} notes, every parameter with its interval: --all lists them"])
     print_files(answer["files"])

@@ -110,7 +110,7 @@ def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
                 "position_m": tip.position.tolist(),
                 "position_sd_m": None if spread is None else spread.tolist(),
                 "pitch_rad": float(tip.pitch),
-                "transmission_angle_rad": float(transmission_angle(q)),
+                "transmission_angle_rad": float(transmission_angle(boom, q)),
                 "gravity_torque": tau.tolist(),
                 "within_limits": not reasons,
                 "reasons": reasons,
@@ -125,7 +125,8 @@ def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
     shown = zip(JOINTS, in_degrees(q), tau, LOAD_UNITS, IS_LENGTH, strict=True)
     rows = [(name, f"{at:.4f} {'m' if length else 'deg'}", f"{load:.2f} {unit}") for name, at, load, unit, length in shown]
     print_rows(("joint", "position", f"to hold {boom.payload.mass:g} kg"), rows)
-    click.echo(f"transmission angle {np.degrees(transmission_angle(q)):.1f} deg; 0 deg is a flat parallelogram")
+    shape = "parallelogram" if boom.geometry.is_parallelogram else "linkage"
+    click.echo(f"transmission angle {np.degrees(transmission_angle(boom, q)):.1f} deg; 0 deg is a flat {shape}")
     print_lines("outside the limits", reasons)
     return 0
 

@@ -11,13 +11,14 @@ maximises log det Y^T Y, which says how much it tells.
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 import numpy as np
 
 from boom_model import Boom, InfeasibleError, InputError, inverse_dynamics
 from boom_model.arrays import Array
+from boom_model.kinematics.linkage import within_reach
 from planner.experiments.identification import base_columns
 from planner.experiments.unknowns import Unknowns
 from planner.motion.trajectory import Trajectory
@@ -42,6 +43,9 @@ costs amplitude."""
 
 _DIFFERENCE = 1e-6
 _SMOOTH = 0.03
+_FROM_REACH = np.radians(0.5)
+"""Unequal links do not close beyond their reach. What the optimiser tries there is given the loads
+of half a degree before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +202,7 @@ def _basis(harmonics: int) -> tuple[Array, Array]:
 
 def _ratios(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
     """Ratios (kinds, n, 5) to every limit."""
-    tau = inverse_dynamics(boom, q, qd, qdd, friction=True, reactions=False).tau
+    tau = inverse_dynamics(boom, within_reach(boom, q, _FROM_REACH), qd, qdd, friction=True, reactions=False).tau
     ratios = limit_ratios(boom, q, qd, qdd, None, tau)
     short = np.zeros_like(q)
     short[:, 2] = 1.0 + boom.limits.linkage - (q[:, 2] - q[:, 1])  # 1 at the limit, as the ratio, but smooth beyond it
@@ -207,7 +211,8 @@ def _ratios(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
 
 def _scaled_regressor(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
     """Y (n, 5, m) at states (n, 5)."""
-    columns, sizes = base_columns(boom)
+    columns, sizes = _columns(boom)
+    q = within_reach(boom, q, _FROM_REACH)
     direction = np.tanh(qd / (_SMOOTH * boom.limits.velocity))  # so that the cost is smooth
     return Unknowns(boom, False, np.ones(5)).rows(q, qd, qdd, direction)[..., columns] / sizes
 
@@ -215,6 +220,15 @@ def _scaled_regressor(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
 def _information(boom: Boom, q: Array, qd: Array, qdd: Array) -> Array:
     Y = _scaled_regressor(boom, q, qd, qdd)
     return np.asarray(np.einsum("njk,njl->kl", Y, Y, optimize=True) / len(q))
+
+
+@lru_cache(maxsize=8)
+def _columns(boom: Boom) -> tuple[Array, Array]:
+    """Columns of the base parameters of equal links.
+
+    What unequal ones show besides is too weak to design for.
+    """
+    return base_columns(replace(boom, geometry=replace(boom.geometry, upper_less_lower=0.0, inner_less_outer=0.0)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,16 @@ from boom_model import JOINTS, Basis, Boom, Origin, Sourced, breakdown
 from boom_model.arrays import Array, read_only
 from boom_model.boom import IS_LENGTH, LOAD_UNITS
 from boom_model.dynamics.regressor import body_of_pseudo_inertia, body_parameters, pseudo_inertia_of_parameters
+from boom_model.kinematics.linkage import within_reach
 from boom_model.plausible import DRIVE_INERTIA
 from planner.experiments.consistency import consistent_fit
-from planner.experiments.log_checks import delay_notes, require_plausible_torques
+from planner.experiments.log_checks import (
+    delay_notes,
+    require_plausible_positions,
+    require_plausible_torques,
+    residual_notes,
+    rotor_notes,
+)
 from planner.experiments.readings import Readings
 from planner.experiments.unknowns import IDENTIFIED_BODIES, Unknowns
 
@@ -190,12 +197,14 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
         drive_inertia: whether the torques accelerate the drives' own inertia too, as those computed from motor currents do.
 
     Raises:
-        InputError: the torques have the wrong sign, unit or side of the gearbox; the message says which.
+        InputError: positions are in another unit, or torques have the wrong sign, unit or side of
+            the gearbox; the message says which.
         InfeasibleError: as `consistent_fit`.
     """
     logs = [log.calibrated(boom) for log in logs]
     seen = [log.part(slice(0, round((1.0 - HELD_OUT) * len(log.t)))) for log in logs]
     kept = [log.part(slice(round((1.0 - HELD_OUT) * len(log.t)), None)) for log in logs]
+    require_plausible_positions(boom, logs)
     require_plausible_torques(boom, seen)
     scale = np.maximum(np.sqrt(np.mean(np.concatenate([log.tau for log in seen]) ** 2, axis=0)), 1e-3)
     unknowns = Unknowns(boom, drive_inertia, scale)
@@ -221,6 +230,8 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
     notes = (
         *dict.fromkeys(note for log in logs for note in log.notes),
         *silent,
+        *(() if drive_inertia else _rotor_notes(found, logs)),
+        *residual_notes(np.array([joint.after for joint in joints]), np.array([joint.noise for joint in joints])),
         *delay_notes(*_delay(found, seen, data, H, variance)),
     )
     return replace(found, joints=joints, notes=notes)
@@ -351,6 +362,7 @@ def _structure(boom: Boom, drive_inertia: bool) -> tuple[Array, tuple[int, ...],
     rng, limits = np.random.default_rng(0), boom.limits
     q = rng.uniform(limits.lower, limits.upper, (_STATES, 5))
     q[:, 2] = rng.uniform(np.maximum(limits.lower[2], q[:, 1] + limits.linkage), limits.upper[2])
+    q = within_reach(boom, q, limits.linkage)
     qd, qdd = (rng.uniform(-1.0, 1.0, (_STATES, 5)) * size for size in (limits.velocity, limits.acceleration))
     Y = unknowns.rows(q, qd, qdd).reshape(-1, 90)
     norms = np.linalg.norm(Y, axis=0)
@@ -405,6 +417,12 @@ def _joint_fits(found: Identification, seen: Sequence[Readings], kept: Sequence[
         each = {name: float(np.sqrt(np.mean(values[:, i] ** 2))) for name, values in parts.items()}
         fits.append(JointFit(joint, LOAD_UNITS[i], float(before[i]), float(after[i]), float(noise[i]), float(inside[i]), each))
     return tuple(fits)
+
+
+def _rotor_notes(found: Identification, logs: Sequence[Readings]) -> tuple[str, ...]:
+    left = [(log.tau - found.unknowns.torque(found.parameters, log)) * log.moving for log in logs]
+    noise = np.sqrt(np.mean([log.torque_noise**2 for log in logs], axis=0))
+    return rotor_notes(np.concatenate(left), np.concatenate([log.qdd * log.moving for log in logs]), noise)
 
 
 def _parts(found: Identification, logs: Sequence[Readings]) -> dict[str, Array]:

@@ -18,7 +18,7 @@ from boom_model.arrays import Array, Mask, read_only
 from boom_model.boom import Body
 from boom_model.dynamics.regressor import body_parameters
 from planner.experiments.identification import autocorrelation_time
-from planner.experiments.log_checks import require_plausible_torques
+from planner.experiments.log_checks import require_plausible_positions, require_plausible_torques
 from planner.experiments.readings import Readings
 from planner.experiments.unknowns import Unknowns
 
@@ -83,6 +83,7 @@ def identify_payload(boom: Boom, logs: Sequence[Readings], *, drive_inertia: boo
         InputError: the torques have the wrong sign, unit or side of the gearbox.
     """
     logs = [log.calibrated(boom) for log in logs]
+    require_plausible_positions(boom, logs)
     require_plausible_torques(boom, logs, payload_known=False)
     unknowns = Unknowns(boom, drive_inertia, np.ones(5))
     parts = [_rows(unknowns, log) for log in logs]

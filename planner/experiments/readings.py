@@ -25,6 +25,8 @@ CUTOFFS = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 LONGEST_GAP = 0.1
 """Longest gap [s] of a log that is interpolated."""
 
+_SLOWEST = 0.05  # [s] between samples
+
 _ORDER = 4
 _REMOVED = 1.2  # a filter may remove this many times the variance of the noise
 _ROUNDING = 1e-6  # [rad, m] resolution below which a position has no noise to tell
@@ -33,6 +35,7 @@ _SIGMAS = 4.0
 _SMEARED = 0.6  # share of 1 / cutoff over which the filter smears a change of direction
 _FEWEST = 40
 _LEAST_MOTION = 1e-3  # [rad, m]
+_ABOVE_NOISE = 1.5  # times the span of noise alone, about 2 sigma sqrt(2 ln n), that a motion must have
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,14 +128,19 @@ def readings_of(log: Log, cutoff: float | None = None, *, every_joint: bool = Tr
         every_joint: whether every joint must move, as a fit needs it.
 
     Raises:
-        InputError: there are no torques or fewer than 40 samples, a gap is too long, a joint does not move, or the cut-off is
-            not below half the sampling rate. The message says what to measure instead.
+        InputError: there are no torques or fewer than 40 samples, samples are too far apart or a
+            gap is too long, a joint does not move beyond its noise, a torque never changes, or the
+            cut-off is not below half the sampling rate. The message says what to measure instead.
     """
     if log.tau is None:
         raise InputError("the log has no torques: measure tau1..tau5, at the joints or as motor currents")
     if len(log.t) < _FEWEST:
         raise InputError(f"the log has {len(log.t)} samples; measure at least {_FEWEST}, better 20 s at 100 Hz or more")
     steps = np.diff(log.t)
+    if (usual := float(np.median(steps))) > _SLOWEST:
+        raise InputError(
+            f"the log has a sample every {usual:.4g} s; measure every {_SLOWEST:g} s or better 0.01 s, and give t in seconds"
+        )
     if steps.max() > LONGEST_GAP:
         at = int(steps.argmax())
         raise InputError(
@@ -142,9 +150,10 @@ def readings_of(log: Log, cutoff: float | None = None, *, every_joint: bool = Tr
     even = evenly_sampled(log, LONGEST_GAP)
     tau, h = even.tau, float(even.t[-1] - even.t[0]) / (len(even.t) - 1)
     assert tau is not None
-    if every_joint:
-        _require_motion(even.q)
     noise = np.maximum(_noise(even.q), _ROUNDING)
+    if every_joint:
+        _require_motion(even.q, noise)
+    _require_torques(tau)
     if cutoff is not None and not 0.0 < cutoff < 0.5 / h:
         raise InputError(f"cutoff is {cutoff:g} Hz; it must be between 0 and {0.5 / h:g} Hz, half the log's sampling rate")
     usable = [cutoff] if cutoff is not None else [f for f in CUTOFFS if f < 0.4 / h] or [0.4 / h]
@@ -196,8 +205,15 @@ def _low_pass(values: Array, step: float, cutoff: float) -> Array:
     return passed
 
 
-def _require_motion(q: Array) -> None:
-    still = [i for i, span in enumerate(np.ptp(q, axis=0)) if span < _LEAST_MOTION]
+def _require_torques(tau: Array) -> None:
+    constant = [f"{JOINTS[i]} (tau{i + 1} = {tau[0, i]:g})" for i, span in enumerate(np.ptp(tau, axis=0)) if span == 0.0]
+    if constant:
+        raise InputError(f"these torques never change: {', '.join(constant)}; measure them: is a sensor not read?")
+
+
+def _require_motion(q: Array, noise: Array) -> None:
+    least = np.maximum(_LEAST_MOTION, _ABOVE_NOISE * 2.0 * np.sqrt(2.0 * np.log(len(q))) * noise)
+    still = [i for i, span in enumerate(np.ptp(q, axis=0)) if span < least[i]]
     if still:
         span = {i: f"{np.ptp(q[:, i]):.2g} {'m' if IS_LENGTH[i] else 'rad'}" for i in still}
         named = ", ".join(f"{JOINTS[i]} ({span[i]})" for i in still)

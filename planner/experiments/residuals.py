@@ -30,7 +30,7 @@ HEADER = ("joint", "before", "after", "noise", "factor", "taken away by")
 PARTS_HEADER = ("joint", "part", "before", "after", "takes away")
 """Columns of `part_cells`: RMS of a part of the model's torque, and its share of the residual."""
 
-_MOST = {True: 4000, False: 400}  # samples at which a model of equal and of unequal links is computed
+_MOST = 4000  # samples at which the models are computed
 _ALIKE = 1.1  # times the noise of the torques, below which a residual may grow
 _SAME = 1e-6  # [m]
 _SHOWN = 0.01  # least share that the short table names
@@ -172,8 +172,7 @@ def residuals(
     if a != b:
         raise InputError(f"payload is {a:g} kg before and {b:g} kg after; give the one that the log has by --payload")
     readings = readings_of(log, cutoff, every_joint=False)
-    equal = before.geometry.is_parallelogram and after.geometry.is_parallelogram
-    some = readings.part(slice(None, None, max(1, -(-len(readings.t) // _MOST[equal]))))
+    some = readings.part(slice(None, None, max(1, -(-len(readings.t) // _MOST))))
     still = [joint for i, joint in enumerate(JOINTS) if not some.moving[:, i].any()]
     notes = [*readings.notes, *(f"{joint} does not move: its torques are left out" for joint in still)]
     if len(some.t) < len(readings.t):

@@ -458,7 +458,7 @@ def _notes(
         notes.append(
             "the loads are those of the given moves only; other moves, and holding in other positions, are not included"
         )
-        least = min(float(transmission_angle(t.q).min()) for t in trajectories)
+        least = min(float(transmission_angle(boom, t.q).min()) for t in trajectories)
         if link.name != "extension" and least < boom.limits.transmission:
             notes.append(
                 f"the linkage comes within {np.degrees(least):.2g} deg of flat, where its geometry determines the loads"

@@ -39,7 +39,7 @@ def link_cases(
     if not trajectories:
         raise InputError("no motion is given; the loads of a link need at least one")
     for i, trajectory in enumerate(trajectories):
-        flat = transmission_angle(trajectory.q) < _FLAT
+        flat = transmission_angle(boom, trajectory.q) < _FLAT
         if link.name != "extension" and flat.any():
             at = trajectory.t[int(np.argmax(flat))]
             raise InputError(f"motion {i + 1}, t = {at:g} s: the linkage is flat, so pin forces are unbounded")

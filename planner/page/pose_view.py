@@ -110,7 +110,7 @@ def fixed(value: float, digits: int) -> str:
 
 
 def _tip_figures(boom: Boom, q: Array, position: Array, pitch: float, loads: Loads) -> tuple[Figure, ...]:
-    angle, sag = float(transmission_angle(q)), tip_deflection(boom, q, loads.tau)
+    angle, sag = float(transmission_angle(boom, q)), tip_deflection(boom, q, loads.tau)
     return (
         *(Figure(f"tip_{axis}", f"tip {axis}", float(at), "m", 4) for axis, at in zip("xyz", position, strict=True)),
         Figure("tip_pitch", "pitch of the end effector", float(np.degrees(pitch)), "deg", 2),

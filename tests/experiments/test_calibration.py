@@ -230,7 +230,7 @@ def test_suggested_poses_are_within_all_bounds_and_tell_more_than_random_ones():
     found = suggest_poses(BOOM, 20, tip_sd=NOISE, lowest=0.3)
     assert found.q.shape == (20, 5)
     assert BOOM.limits.contain(found.q).all()
-    assert (transmission_angle(found.q) >= BOOM.limits.transmission - 1e-9).all()
+    assert (transmission_angle(BOOM, found.q) >= BOOM.limits.transmission - 1e-9).all()
     assert (forward_kinematics(BOOM, found.q).position[:, 2] >= 0.3).all()
     assert found.gain > 1.1
     rng, best = np.random.default_rng(3), suggest_poses(BOOM, 20, tip_sd=NOISE).q

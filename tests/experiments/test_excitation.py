@@ -1,6 +1,8 @@
 """Motions designed for identification: better than random ones, within every limit, from rest to
 rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -69,3 +71,11 @@ def test_the_same_seed_gives_the_same_motion() -> None:
 def test_too_few_harmonics_are_refused() -> None:
     with pytest.raises(InputError, match="2 harmonics in 20 s: at least 3"):
         design(BOOM, harmonics=2)
+
+
+def test_motions_of_unequal_links_keep_the_limits_too() -> None:
+    unequal = replace(BOOM, geometry=replace(BOOM.geometry, upper_less_lower=2e-3, inner_less_outer=-8e-3))
+    random = random_excitation(unequal, np.random.default_rng(4))
+    for motion in (random, design(unequal, seed=1, rounds=1)):
+        assert motion.worst_ratio() <= 1.0
+        assert np.isfinite(condition_number(unequal, motion(T)))

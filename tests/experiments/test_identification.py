@@ -154,14 +154,44 @@ def cut(log: Log) -> Log:
     return Log.of(log.t[:30], log.q[:30], tau=log.tau[:30])
 
 
+def held(log: Log) -> Log:
+    """The yaw stands still, but for the noise of its encoder."""
+    q = log.q.copy()
+    q[:, 0] = 0.3 + 2e-4 * np.random.default_rng(0).normal(size=len(q))
+    return replace(log, q=read_only(q))
+
+
+def seldom(log: Log) -> Log:
+    assert log.tau is not None
+    return Log.of(log.t[::100], log.q[::100], tau=log.tau[::100])
+
+
+def unread(log: Log) -> Log:
+    assert log.tau is not None
+    return replace(log, tau=read_only(np.where(np.arange(5) == 2, 7.0, log.tau)))
+
+
 @pytest.mark.parametrize(
     ("slip", "said"),
     [
-        (turned, r"inner \(tau2\) .*look turned round: .*multiply tau2 by -1"),
+        (turned, r"inner \(tau2\) look turned round, because they are -\d.*multiply tau2 by -1"),
+        *[
+            (
+                lambda log, i=i: scaled(log, [-1.0 if k == i else 1.0 for k in range(5)]),
+                rf"\(tau{i + 1}\) look turned round.* \(multiply tau{i + 1} by -1",
+            )
+            for i in range(5)
+        ],
+        (lambda log: scaled(log, [1e-3, 1.0, 1.0, 1.0, 1.0]), r"yaw .* must be in Nm, behind the gearbox"),
+        (lambda log: scaled(log, [1.0, 1.0, 1.0 / 160, 1.0, 1.0]), r"lower .*(gearbox of ratio|by the gear ratio) 160"),
+        (lambda log: replace(log, q=read_only(np.degrees(log.q))), r"q1\) is .*far outside of its limits.*must be in rad"),
         (lambda log: scaled(log, [1.0, 1.0, 1.0, 1e-3, 1.0]), r"extension \(tau4\) .*look like kN; they must be in N"),
         (lambda log: scaled(log, [1.0, 1.0 / 160, 1.0, 1.0, 1.0]), r"inner .*those of the motor: multiply them by .* 160"),
         (with_gap, r"gap of 0\.4\d* s after t = .* measure without gaps"),
         (still, r"do not move: wrist .*boom identify --design"),
+        (held, r"do not move: yaw .*boom identify --design"),
+        (seldom, r"a sample every 0\.1 s; measure every 0\.05 s"),
+        (unread, r"never change: lower \(tau3 = 7\)"),
         (cut, r"30 samples; measure at least 40"),
         (lambda log: replace(log, tau=None), r"no torques: measure tau1\.\.tau5"),
     ],
@@ -171,6 +201,15 @@ def test_a_slip_is_named_with_what_to_measure(slip: object, said: str) -> None:
     boom = Boom.load().with_payload(0.0)
     with pytest.raises(InputError, match=said):
         identify(boom, [readings_of(slip(measured(0).log))], drive_inertia=True)
+
+
+def test_single_wrong_samples_are_noticed() -> None:
+    log = measured(0).log
+    assert log.tau is not None
+    wrong = 500.0 * (np.random.default_rng(0).uniform(size=log.tau.shape) < 0.005)
+    notes = identify(BOOM, [readings_of(replace(log, tau=read_only(log.tau + wrong)))], drive_inertia=True).notes
+    assert any("stays unexplained of" in note and "single wrong samples" in note for note in notes)
+    assert not any("stays unexplained" in note for note in identified(0).notes)
 
 
 def test_a_wrong_payload_is_named() -> None:
@@ -185,6 +224,14 @@ def test_torques_that_are_stamped_late_are_noticed() -> None:
     notes = identify(BOOM, [readings_of(shifted)], drive_inertia=True).notes
     assert any("stamped" in note and "late" in note for note in notes)
     assert not any("stamped" in note for note in identified(3).notes)
+
+
+def test_torques_of_motors_are_noticed() -> None:
+    notes = identify(BOOM, [readings_of(measured(0).log)]).notes
+    said = [note for note in notes if "follows the acceleration: torques of motors need --drive-inertia" in note]
+    assert len(said) == 1
+    assert "extension" in said[0]
+    assert not any("follows the acceleration" in note for note in identified(0).notes)
 
 
 START, GOAL = np.array([0.3, 0.4, 1.8, 0.2, -0.8]), np.array([1.5, 1.2, 2.8, 0.8, 0.9])

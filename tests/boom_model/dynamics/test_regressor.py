@@ -124,8 +124,23 @@ def test_shapes_broadcast_and_bad_ones_are_named(boom: Boom) -> None:
         regressor(boom, q, np.zeros(4), np.zeros(5))
 
 
-def test_unequal_links_are_refused():
-    boom = Boom.load()
-    unequal = replace(boom, geometry=replace(boom.geometry, upper_less_lower=1e-3))
-    with pytest.raises(InputError, match="the regressor needs a parallelogram; this boom has L5 - L3 = 1 mm"):
-        regressor(unequal, *np.zeros((3, 5)))
+@pytest.mark.parametrize(("moving", "combinations"), [(False, 37), (True, 43)])
+def test_unequal_links_show_eight_combinations_more(boom: Boom, moving: bool, combinations: int) -> None:
+    unequal = replace(boom, geometry=replace(boom.geometry, upper_less_lower=2e-3, inner_less_outer=-3e-3))
+    rng = np.random.default_rng(3)
+    q, qd, qdd = random_states(boom, 400, rng)
+    q[:, 2] = q[:, 1] + rng.uniform(0.3, 2.6, 400)
+    base = random_base(rng, 400) if moving else None
+    assert rank(regressor(unequal, q, qd, qdd, base=base)) == combinations
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_unequal_links_have_a_regressor_too(boom: Boom, moving: bool) -> None:
+    unequal = replace(boom, geometry=replace(boom.geometry, upper_less_lower=4e-3, inner_less_outer=-6e-3))
+    rng = np.random.default_rng(5)
+    q, qd, qdd = random_states(boom, COUNT, rng)
+    q[:, 2] = q[:, 1] + rng.uniform(0.3, 2.6, COUNT)  # where these links close
+    base = random_base(rng, COUNT) if moving else None
+    expected = inverse_dynamics(unequal, q, qd, qdd, base=base, reactions=False).tau
+    actual = regressor(unequal, q, qd, qdd, base=base) @ inertial_parameters(unequal)
+    np.testing.assert_allclose(actual, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())

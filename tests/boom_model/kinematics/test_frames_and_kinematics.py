@@ -215,7 +215,7 @@ def test_manipulability_vanishes_in_singular_poses(pose):
 @pytest.mark.parametrize("inner", [0.0, 60.0, 100.0])
 def test_transmission_angle_is_the_acute_angle_between_the_links(inner, gap, angle):
     q = np.radians([30.0, inner, inner + gap, 0.0, 40.0])
-    assert_equal(transmission_angle(q), np.radians(angle), tolerance=1e-15)
+    assert_equal(transmission_angle(BOOM, q), np.radians(angle), tolerance=1e-15)
 
 
 @LOOPS
@@ -325,7 +325,7 @@ def test_batches_are_their_states_one_by_one(shape):
         ((3,), lambda q: forward_kinematics(BOOM, q).position),
         ((3, 3), lambda q: forward_kinematics(BOOM, q).rotation),
         ((), lambda q: forward_kinematics(BOOM, q).pitch),
-        ((), transmission_angle),
+        ((), lambda q: transmission_angle(BOOM, q)),
     ):
         expected = np.reshape([function(one) for one in q], (*shape, *last))
         np.testing.assert_array_equal(function(q.reshape(*shape, 5)), expected, strict=True)
@@ -372,7 +372,7 @@ def test_a_base_that_does_not_match_the_states_is_named(given, shape):
         jacobian,
         manipulability,
         body_transforms,
-        lambda boom, q: transmission_angle(q),
+        transmission_angle,
         lambda boom, q: frame_transforms(boom, q, "inner"),
         lambda boom, q: jacobian_rate(boom, q, np.zeros(5)),
         lambda boom, q: frame_motion(boom, q, np.zeros(5), np.zeros(5), "inner"),

@@ -24,13 +24,16 @@ from boom_model import (
     jacobian,
     jacobian_rate,
     kinetic_energy,
+    mass_matrix,
     potential_energy,
     solve_branches,
+    transmission_angle,
 )
 from boom_model.boom_file import BOOM_FILE
-from boom_model.dynamics.virtual_work import balance
+from boom_model.dynamics.regressor import regressor
 from boom_model.kinematics.frames import frame_transforms
 from boom_model.kinematics.linkage import directions, length_derivatives, lower_angle
+from tests.oracles import generic, mujoco_closed_loop, random_base
 
 BOOM = Boom.load()
 
@@ -79,6 +82,17 @@ def test_both_loops_and_the_closed_form_have_the_same_tip():
     np.testing.assert_allclose(np.linalg.norm(pin_7 - pin_8, axis=-1), UNEQUAL.geometry.L5, rtol=1e-13)
 
 
+def test_the_transmission_angle_is_that_at_pin_7():
+    q, _, _ = states(50)
+    poses = body_transforms(UNEQUAL, q)
+    pin_6, pin_8 = poses["outer"][:, :3, 3], frame_transforms(UNEQUAL, q, "inner")[:, 5, :3, 3]
+    pin_7 = pin_6 + UNEQUAL.geometry.L4 * poses["outer"][:, :3, 0]
+    area = np.linalg.norm(np.cross(pin_7 - pin_6, pin_7 - pin_8), axis=-1)
+    sine = area / (UNEQUAL.geometry.L4 * UNEQUAL.geometry.L5)
+    np.testing.assert_allclose(np.sin(transmission_angle(UNEQUAL, q)), sine, rtol=0, atol=3e-14)
+    assert np.abs(transmission_angle(UNEQUAL, q) - transmission_angle(BOOM, q)).max() > 0.01
+
+
 def test_jacobian_and_its_rate_are_derivatives():
     q, qd, _ = states(50)
     h = 1e-5
@@ -103,18 +117,57 @@ def test_derivatives_by_the_lengths_are_differences(column, name):
     np.testing.assert_allclose(length_derivatives(UNEQUAL, q)[:, column], slope, rtol=0, atol=5e-8)
 
 
-def test_loads_of_equal_links_are_those_of_newton_euler():
+def test_loads_are_those_of_mujocos_closed_loop():
+    q, qd, qdd = states(40)
+    boom = replace(generic(UNEQUAL), drives=UNEQUAL.drives)
+    for base in (None, random_base(np.random.default_rng(1), 40)):
+        known, found = mujoco_closed_loop(boom, q, qd, qdd, base), inverse_dynamics(boom, q, qd, qdd, base=base)
+        np.testing.assert_allclose(found.tau, known.tau, rtol=0, atol=1e-11)
+        np.testing.assert_allclose(found.pins.frame_7, known.pin_7, rtol=0, atol=8e-11)
+        np.testing.assert_allclose(found.mount, known.mount, rtol=0, atol=8e-12)
+
+
+def test_a_force_on_the_tip_works_by_the_jacobian():
+    q, qd, qdd = states(100)
+    push = np.random.default_rng(3).normal(size=(2, 100, 3))
+    pushed = inverse_dynamics(UNEQUAL, q, qd, qdd, tip_force=push[0], tip_moment=push[1]).tau
+    by_jacobian = (np.concatenate([*push], axis=-1)[:, None] @ jacobian(UNEQUAL, q))[:, 0]
+    np.testing.assert_allclose(inverse_dynamics(UNEQUAL, q, qd, qdd).tau - pushed, by_jacobian, rtol=0, atol=9e-13)
+
+
+def test_equal_links_are_the_limit():
+    """Links that differ by less than rounding take the way of unequal ones."""
     q, qd, qdd = states(200)
-    rng = np.random.default_rng(1)
-    base = BaseMotion.of(*rng.normal(size=(4, 3)), up=[0.1, 0.2, 1.0])
-    force, moment = 30.0 * rng.normal(size=(2, 200, 3))
+    boom = generic(BOOM)
+    equal = replace(boom, geometry=replace(boom.geometry, upper_less_lower=1e-300))
+    assert not equal.geometry.is_parallelogram
+    base = random_base(np.random.default_rng(1), 200)
+    force, moment = 30.0 * np.random.default_rng(2).normal(size=(2, 200, 3))
     for payload_as in ("mass", "force"):
-        known = inverse_dynamics(BOOM, q, qd, qdd, base=base, payload_as=payload_as, tip_force=force, tip_moment=moment)
-        found = balance(BOOM, q, qd, qdd, base, payload_as_force=payload_as == "force", tip_force=force, tip_moment=moment)
-        np.testing.assert_allclose(found.tau, known.tau, rtol=0, atol=5e-12)
-        np.testing.assert_allclose(found.mount, known.mount, rtol=0, atol=5e-12)
-        for pin, same in zip(found.pins, (known.pins.frame_6, known.pins.frame_7, known.pins.frame_8), strict=True):
-            np.testing.assert_allclose(pin, same, rtol=0, atol=2e-11)
+        given = {"base": base, "payload_as": payload_as, "tip_force": force, "tip_moment": moment}
+        known, found = (inverse_dynamics(each, q, qd, qdd, **given) for each in (boom, equal))
+        np.testing.assert_allclose(found.tau, known.tau, rtol=0, atol=2e-11)
+        np.testing.assert_allclose(found.mount, known.mount, rtol=0, atol=2e-11)
+        for pin in ("frame_6", "frame_7", "frame_8"):
+            np.testing.assert_allclose(getattr(found.pins, pin), getattr(known.pins, pin), rtol=0, atol=2e-10)
+    np.testing.assert_allclose(mass_matrix(equal, q), mass_matrix(boom, q), rtol=0, atol=2e-12)
+    np.testing.assert_allclose(regressor(equal, q, qd, qdd), regressor(boom, q, qd, qdd), rtol=0, atol=2e-12)
+
+
+def test_a_state_alone_has_the_loads_that_it_has_in_a_batch():
+    q, qd, qdd = states(20)
+    batch = inverse_dynamics(UNEQUAL, q, qd, qdd)
+    for i in range(20):
+        alone = inverse_dynamics(UNEQUAL, q[i], qd[i], qdd[i])
+        np.testing.assert_allclose(alone.tau, batch.tau[i], rtol=0, atol=1e-13)
+        np.testing.assert_allclose(alone.mount, batch.mount[i], rtol=0, atol=1e-13)
+
+
+def test_the_mass_matrix_is_the_torque_of_unit_accelerations():
+    q, _, _ = states(50)
+    falling = BaseMotion.of(acceleration=(0.0, 0.0, -UNEQUAL.gravity))
+    columns = inverse_dynamics(UNEQUAL, q[:, None], np.zeros(5), np.eye(5), base=falling).tau
+    np.testing.assert_allclose(mass_matrix(UNEQUAL, q), columns, rtol=0, atol=1.4e-13)
 
 
 def test_power_is_the_rate_of_energy_and_forward_dynamics_is_the_inverse():
@@ -161,6 +214,16 @@ def test_links_that_do_not_reach_each_other_are_named():
     q = np.array([0.0, 0.0, np.pi, 0.0, 0.0])
     with pytest.raises(InfeasibleError, match=r"cannot close at lower - inner = 180 deg: .*L5 0\.297"):
         forward_kinematics(short, q)
+
+
+@pytest.mark.parametrize("state", [np.array([0.0, 0.0, np.pi, 0.0, 0.0]), np.array([[0.1, 0.2, np.pi + 0.2, 0.0, 0.0]] * 2)])
+def test_loads_of_links_that_do_not_reach_each_other_are_refused(state):
+    short = with_links(L5=0.297, L9=1.0, L4=0.998)
+    with pytest.raises(InfeasibleError, match=r"cannot close at lower - inner = 180 deg: .* do not reach each other"):
+        inverse_dynamics(short, state, np.zeros(5), np.zeros(5))
+    in_line = with_links(L5=0.25, L9=1.0, L4=1.05)  # L3 + L9 = L4 + L5
+    with pytest.raises(InfeasibleError, match=r"at lower - inner = 180 deg: .* in line with the upper one|do not reach"):
+        inverse_dynamics(in_line, state, np.zeros(5), np.zeros(5))
 
 
 def test_a_boom_file_may_have_unequal_links(tmp_path):
