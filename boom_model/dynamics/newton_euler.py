@@ -187,7 +187,7 @@ def weight_torque(boom: Boom, q: Array, up: Array | None = None) -> Array:
     Q = regrouped(boom, "mass").torque_rows[:, _O].tolist()
     U = tuple([moment * along for moment in Q] for along in (x, z, n))
     links, loop = _turns(boom.geometry, state)
-    torques = _torques(boom.geometry.L7 + state.q[3], links, loop, U, _NOTHING).tau
+    torques = _torques(boom.geometry.L7 + state.q[3], links, loop, U, _NOTHING)[0]
     tau = np.empty((5, len(q)))
     for row, torque in zip(tau, torques, strict=True):
         row[:] = torque
@@ -242,7 +242,7 @@ def element_velocities(boom: Boom, q: Array) -> Array:
     """
     columns, still = list(np.ascontiguousarray(q.T)), [np.zeros(len(q))] * 5
     links, loop = _turns(boom.geometry, _State(columns, still, still))
-    rho, (c3, s3) = boom.geometry.L7 + q[:, 3], (links[1].c, links[1].s)
+    rho, (c3, s3) = boom.geometry.L7 + q[:, 3], (links[1][0], links[1][1])
     by: tuple[dict[int, Value], ...]  # the joint's derivative of the angle of each link
     if loop is None:
         by = ({}, {0: 1.0}, {1: 1.0, 2: 1.0}, {}, {2: 1.0})
@@ -255,10 +255,10 @@ def element_velocities(boom: Boom, q: Array) -> Array:
     moved[0, 2, _RHO] = -rho * c3
     moved[3, 0, _RHO], moved[3, 1, _RHO] = c3, s3
     for i, ((e, p), link) in enumerate(zip(_LINKS, links, strict=False)):
-        moved[0, 2, e], moved[0, 2, p] = -link.c, link.s
+        moved[0, 2, e], moved[0, 2, p] = -link[0], link[1]
         for joint, turned in enumerate(by):
             if i in turned:
-                along, across = turned[i] * link.c, turned[i] * link.s
+                along, across = turned[i] * link[0], turned[i] * link[1]
                 moved[joint, 0, e], moved[joint, 1, e] = -across, along
                 moved[joint, 0, p], moved[joint, 1, p] = -along, -across
                 if i == 1:
@@ -434,13 +434,9 @@ def _plane(boom: Boom, state: _State, *base: Sequence[Value]) -> _Plane:
     return _Plane(lift, a, (w1, w2 + rate, w3), (d1 - rate * w3, d2 + accel, d3 + rate * w1), False)
 
 
-class _Turn(NamedTuple):
-    """How a link at an angle turns in the arm's plane."""
-
-    c: Value
-    s: Value
-    rate: Value
-    accel: Value
+_Turn = tuple[Value, Value, Value, Value]
+"""How a link at an angle turns in the arm's plane: cosine, sine, rate and acceleration. A plain
+tuple, because a single state makes few others."""
 
 
 def _turns(g: Geometry, state: _State) -> tuple[tuple[_Turn, ...], Loop | None]:
@@ -449,16 +445,17 @@ def _turns(g: Geometry, state: _State) -> tuple[tuple[_Turn, ...], Loop | None]:
     Raises:
         InfeasibleError: the linkage cannot close.
     """
-    q, qd, qdd = state
-    inner, lower = _Turn(*cosine_and_sine(q[1]), qd[1], qdd[1]), _Turn(*cosine_and_sine(q[2]), qd[2], qdd[2])
+    (_, q2, q3, _, q5), (_, qd2, qd3, _, qd5), (_, qdd2, qdd3, _, qdd5) = state
+    (c2, s2), (c3, s3) = cosine_and_sine(q2), cosine_and_sine(q3)
+    inner, lower = (c2, s2, qd2, qdd2), (c3, s3, qd3, qdd3)
     if g.is_parallelogram:
-        return (inner, lower, _Turn(*cosine_and_sine(q[2] + q[4]), qd[2] + qd[4], qdd[2] + qdd[4])), None
-    loop = solved_loop(g, (inner.c, inner.s), (lower.c, lower.s))
-    both = loop.rates(qd[1], qd[2]), loop.accelerations((qd[1], qd[2]), qdd[1], qdd[2])
-    upper, outer = (_Turn(*unit, both[0][i], both[1][i]) for i, unit in enumerate((loop.upper, loop.outer)))
-    c, s = cosine_and_sine(q[4])
-    tool = _Turn(upper.c * c - upper.s * s, upper.s * c + upper.c * s, upper.rate + qd[4], upper.accel + qdd[4])
-    return (inner, upper, tool, lower, outer), loop
+        c, s = cosine_and_sine(q3 + q5)
+        return (inner, lower, (c, s, qd3 + qd5, qdd3 + qdd5)), None
+    loop = solved_loop(g, (c2, s2), (c3, s3))
+    rates, accels = loop.rates(qd2, qd3), loop.accelerations((qd2, qd3), qdd2, qdd3)
+    (cu, su), (c, s) = loop.upper, cosine_and_sine(q5)
+    tool = (cu * c - su * s, su * c + cu * s, rates[0] + qd5, accels[0] + qdd5)
+    return (inner, (cu, su, rates[0], accels[0]), tool, lower, (*loop.outer, rates[1], accels[1])), loop
 
 
 def _accelerations(state: _State, plane: _Plane, links: Sequence[_Turn], rho: Value) -> _Rows:
@@ -527,37 +524,32 @@ def _fill_moving(A: Any, plane: _Plane, links: Sequence[_Turn]) -> None:
         An[p] = m * c - k * s
 
 
-class _Torques(NamedTuple):
-    """Joint torques, and moments that pins and mount ask for."""
+def _torques(
+    rho: Value, links: Sequence[_Turn], loop: Loop | None, U: Any, moment: _Vector
+) -> tuple[tuple[Value, ...], Value, Value]:
+    """Return joint torques, the moment of all beyond the actuator about its pin, and that in the plane.
 
-    tau: tuple[Value, ...]
-    beyond_actuator: Value
-    """Moment of all beyond the actuator about its pin."""
-    in_plane: Value
-    """Sum of the torques on all links in the arm's plane."""
-
-
-def _torques(rho: Value, links: Sequence[_Turn], loop: Loop | None, U: Any, moment: _Vector) -> _Torques:
-    """Return the joint torques; U is along x, z and n."""
+    The last is the sum of the torques on all links in the arm's plane. U is along x, z and n.
+    """
     Ux, Uz, Un = U
-    c3, s3, _, _ = links[1]
-    on_links = [_about(link, Ux, Uz, e, p) for (e, p), link in zip(_LINKS, links, strict=False)]
-    on_tool = on_links[2] - moment[2]
+    (c2, s2, _, _), (c3, s3, _, _), (ct, st, _, _) = links[:3]
+    on_tool = ct * (Uz[_ET] - Ux[_PT]) - st * (Ux[_ET] + Uz[_PT]) - moment[2]
     beyond_actuator = rho * (c3 * Uz[_RHO] - s3 * Ux[_RHO]) + on_tool
     # x and z of the vectors b, less those of the base itself, for moments that need all of the boom
-    reach = rho * c3 * Un[_RHO]
-    for (e, p), (c, s, _, _) in zip(_LINKS, links, strict=False):
-        reach = reach + (c * Un[e] - s * Un[p])
-    tau_1 = Ux[_N] - Un[_X] - reach - moment[1]
-    tau_2, tau_3 = on_links[0], on_links[1] + beyond_actuator
+    reach = (c2 * Un[_E2] - s2 * Un[_P2]) + (c3 * Un[_E3] - s3 * Un[_P3]) + rho * c3 * Un[_RHO] + (ct * Un[_ET] - st * Un[_PT])
+    tau_2 = c2 * (Uz[_E2] - Ux[_P2]) - s2 * (Ux[_E2] + Uz[_P2])
+    tau_3 = c3 * (Uz[_E3] - Ux[_P3]) - s3 * (Ux[_E3] + Uz[_P3]) + beyond_actuator
     in_plane = tau_2 + tau_3
     if loop is not None:
-        at_psi, (lower, outer) = tau_3, on_links[3:]
+        for (e, p), (c, s, _, _) in zip(_LINKS[3:], links[3:], strict=True):
+            reach = reach + (c * Un[e] - s * Un[p])
+        at_psi, lower, outer = tau_3, _about(links[3], Ux, Uz, _EL, _PL), _about(links[4], Ux, Uz, _EO, _PO)
         in_plane = in_plane + lower + outer
         tau_2 = tau_2 + loop.upper_by[0] * at_psi + loop.outer_by[0] * outer
         tau_3 = lower + loop.upper_by[1] * at_psi + loop.outer_by[1] * outer
+    tau_1 = Ux[_N] - Un[_X] - reach - moment[1]
     tau_4 = c3 * Ux[_RHO] + s3 * Uz[_RHO]
-    return _Torques((tau_1, tau_2, tau_3, tau_4, on_tool), beyond_actuator, in_plane)
+    return (tau_1, tau_2, tau_3, tau_4, on_tool), beyond_actuator, in_plane
 
 
 def _about(link: _Turn, Ux: Sequence[Value], Uz: Sequence[Value], e: int, p: int) -> Value:
@@ -583,7 +575,7 @@ def _single(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array | 
     rho, (links, loop) = boom.geometry.L7 + state.q[3], _turns(boom.geometry, state)
     x, z, n = _accelerations(state, _plane(boom, state), links, rho)
     U = np.array(x + z + n).reshape(3, len(x)).dot(regrouped(boom, "mass").torque_rows.T).tolist()
-    return np.array(_torques(rho, links, loop, U, _NOTHING).tau)
+    return np.array(_torques(rho, links, loop, U, _NOTHING)[0])
 
 
 def _newton_euler(
