@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROUNDS = 3
+ROUNDS = 5
 """Runs of each process in turn. The quickest counts."""
 
 
@@ -21,7 +21,7 @@ def cpu_seconds(*arguments: str, where: Path) -> float:
 
 
 def test_a_plan_takes_about_three_imports_of_rerun(tmp_path: Path):
-    """2.1, or 2.8 where pandas is installed, which pyarrow then imports.
+    """2.1, or 2.5 to 3.2 where pandas is installed, which pyarrow then imports.
 
     The move itself is a tenth of it.
     """
@@ -32,7 +32,7 @@ def test_a_plan_takes_about_three_imports_of_rerun(tmp_path: Path):
             spent[name].append(cpu_seconds(*arguments, where=tmp_path))
     ratio = min(spent["plan"]) / min(spent["rerun"])
     print(f"boom plan takes {ratio:.2f} of `import rerun`")
-    assert ratio < 3.3
+    assert ratio < 3.4
 
 
 def test_a_plan_imports_neither_pictures_nor_control_nor_scipy(tmp_path: Path):
