@@ -340,13 +340,19 @@ class Results:
         return [Index(name, *map(float, row)) for name, *row in zip(names, *columns, strict=True)]
 
     def _factorial(self, values: Array) -> list[Index]:
-        """Return shares of the variance over a grid; combinations without a value are left out.
+        """Return shares of the variance over a grid.
 
         first = 1 - SS(y - mean of y at the factor's level) / SS(y - mean of y)
         total = SS(y - mean of y at the other factors' levels) / SS(y - mean of y)
+
+        Where combinations have no value, levels are left out until the rest is a whole grid: each
+        time the level with the largest share of them.
         """
-        known = np.isfinite(values)
-        y, levels = values[known], self.study.design.coordinates[known]
+        y, levels = values, self.study.design.coordinates
+        while not np.isfinite(y).all():
+            slabs = [levels[:, i] == level for i in range(levels.shape[1]) for level in np.unique(levels[:, i])]
+            worst = max(slabs, key=lambda slab: float(np.isnan(y[slab]).mean()))
+            y, levels = y[~worst], levels[~worst]
         if not len(y) or np.ptp(y) == 0.0:
             return []
         whole = _spread(y, np.zeros((len(y), 1)))

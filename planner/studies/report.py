@@ -27,15 +27,17 @@ def sentences(results: Results) -> tuple[str, ...]:
     drawn = f"{len(results.refused):,} samples of {len(design.factors)} factors ({design.kind}, seed {study.seed})"
     how = f"{study.work}, {drawn}"
     counted = [
-        f"{int(mask.sum())} {word}" for mask, word in ((results.infeasible, "without a motion"), (results.refused, "refused"))
+        f"{mask.sum():,} {word}"
+        for mask, word in ((results.infeasible, "without a motion"), (results.refused, "refused"))
+        if mask.any()
     ]
     if found is None:
-        return asked, how, f"no sample could be checked; {', '.join(counted)}"
-    if study.design.kind is DesignKind.GRID:
-        answer = f"{found.fails} of {found.samples} FAIL; {', '.join(counted)}"
+        answer = "no sample could be checked"
+    elif study.design.kind is DesignKind.GRID:
+        answer = f"{found.fails} of {found.samples} FAIL"
     else:
-        answer = f"FAIL: {chance(found)}; {', '.join(counted)}"
-    return asked, how, answer
+        answer = f"FAIL: {chance(found)}"
+    return asked, how, "; ".join([answer, ", ".join(counted)] if counted else [answer])
 
 
 def chance(found: Probability) -> str:

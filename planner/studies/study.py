@@ -203,7 +203,8 @@ def load_study(
     if table.move is None:
         work = f"mission {table.mission}"
     else:
-        work = f"{table.move.start} to {table.move.goal}, {table.move.profile}"
+        varied = any("profile" in factor.keys for factor in factors)
+        work = f"{table.move.start} to {table.move.goal}" + ("" if varied else f", {table.move.profile}")
     return Study(
         name=table.name,
         question=table.question,

@@ -73,6 +73,19 @@ def test_a_grid_gives_exact_shares_of_the_variance(tmp_path):
     whole = parts.sum()
     np.testing.assert_allclose([a.first, b.first], parts[:2] / whole, rtol=1e-12)
     np.testing.assert_allclose([a.total, b.total], (parts[:2] + parts[2]) / whole, rtol=1e-12)
+    fourth = [*factors, Factor("d", (), False, levels=(0.0, 1.0))]
+    gaps = results_of(  # without a value at most combinations with d = 1
+        tmp_path,
+        lambda x: (2 * x[:, 0] - 1) + (x[:, 1] - 1) * (2 + (2 * x[:, 0] - 1)),
+        fourth,
+        DesignKind.GRID,
+        1,
+        refused=[1, 3, 5, 7],
+    )
+    shares = {index.factor: (index.first, index.total) for index in gaps.indices("y")}
+    assert shares["a"] == pytest.approx((a.first, a.total))
+    assert shares["b"] == pytest.approx((b.first, b.total))
+    assert shares["d"] == pytest.approx((0.0, 0.0))
     assert told(("a", "b"), [("-", "1"), ("-", "-")]) == (("b",), [("1",), ("-",)])
 
 
