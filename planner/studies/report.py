@@ -89,14 +89,15 @@ def decided_by(found: ResponseSummary) -> str:
 
 def index_rows(results: Results, indices: Sequence[Index]) -> list[tuple[str, ...]]:
     """Return the rows of INDEX_HEADER."""
+    exact = results.study.design.kind is DesignKind.GRID
     laws = {factor.name: factor.law for factor in results.study.design.factors}
     return [
         (
             index.factor,
             f"{index.first:.3f}",
-            f"{index.first_error:.3f}" if index.first_error else "-",
+            "-" if exact else f"{index.first_error:.3f}",
             "-" if index.total is None else f"{index.total:.3f}",
-            f"{index.total_error:.3f}" if index.total_error else "-",
+            "-" if exact or index.total_error is None else f"{index.total_error:.3f}",
             laws[index.factor],
         )
         for index in indices
