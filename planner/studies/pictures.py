@@ -127,7 +127,8 @@ def _scatter(results: Results, response: str, factor: Factor) -> "Figure":
         across = axes.get_xaxis_transform()
         axes.scatter(x[~moves], top, s=20, color=_FAIL, marker="|", label="FAIL: no motion", transform=across)
         axes.margins(y=0.12)
-    axes.update_datalim(np.stack([x, np.full(len(x), np.nan)], axis=-1), updatey=False)
+    beside = 0.05 * max(float(np.ptp(x)), 1e-9)  # marks at the top do not widen the axis by themselves
+    axes.set_xlim(float(x.min()) - beside, float(x.max()) + beside)
     axes.set(xlabel=factor.name, ylabel=text)
     axes.grid(alpha=0.3)
     figure.legend(frameon=False, ncols=3, loc="outside lower center")

@@ -174,7 +174,8 @@ def notes(results: Results) -> tuple[str, ...]:
     factors = results.study.design.factors
     said = [f"{f.name}: {f.law}; {f.basis}: {f.source}" for f in factors]
     for status, word in ((REFUSED, "refused"), (INFEASIBLE, "without a motion")):
-        said += [f"{count} {word}: {reason}" for reason, count in results.reasons(status)[:_FEW]]
+        for reason, count in results.reasons(status)[:_FEW]:
+            said.append(f"{count:,} {word}{', such as' if count > 1 else ''}: {reason}")
     said += [f"tightest limit in {count:,} samples: {name}" for name, count in results.tightest()[:_FEW]]
     return tuple(said)
 

@@ -8,7 +8,7 @@ from boom_model import InputError
 from planner.studies.analysis import FAILS
 from planner.studies.designs import DesignKind
 from planner.studies.factors import Factor
-from planner.studies.report import front_rows, response_rows, to_json, told
+from planner.studies.report import front_rows, notes, response_rows, to_json, told
 from tests.studies.helpers import normal, results_of, uniform
 
 G = np.array([0.0, 1.0, 4.5, 9.0])
@@ -131,7 +131,8 @@ def test_refused_samples_are_in_no_probability(tmp_path):
         tmp_path, lambda x: x[:, 0], factors, DesignKind.LATIN_HYPERCUBE, 100, fail_above=0.5, refused=[10, 11, 12]
     )
     assert made.fails().samples == 97
-    assert made.reasons("refused") == (("no boom", 3),)
+    assert made.reasons("refused") == (("the mass is -10.5e-3 kg", 3),)
+    assert "3 refused, such as: the mass is -10.5e-3 kg" in notes(made)
 
 
 def test_first_order_propagation_is_exact_where_the_response_is_linear(tmp_path):
