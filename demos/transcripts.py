@@ -38,6 +38,7 @@ PAGES = {
             "boom mission table-2-4 table-3-1",
             "boom size field-day",
             "boom require field-day",
+            "boom study lighter-motor --samples 32 --workers 1",
             "boom control transport phenotyping",
             "boom link",
             "boom catalogue",

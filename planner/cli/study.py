@@ -10,6 +10,8 @@ from planner.cli.options import all_option, boom_option, given_catalogue, json_o
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows, tracked
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from planner.files import Outputs
     from planner.studies.analysis import Results
 
@@ -128,5 +130,14 @@ def _details(results: "Results") -> list[tuple[tuple[str, ...], list[Any], int]]
     levels = report.level_rows(results)
     indices = report.index_rows(results, results.indices(FAILS))
     bounds = report.boundary_rows(results)
-    first = [(*bounds, 12)] if bounds[1] else [(report.LEVEL_HEADER, levels, 6)] if not front else []
-    return [*first, (report.INDEX_HEADER, indices, 3), (header, front, 8)]
+    if bounds[1]:
+        return [(*bounds, 12)]
+    first = [] if front else [(report.LEVEL_HEADER, levels, _whole_factors(levels, 7))]
+    return [*first, (report.INDEX_HEADER, indices, 2), (header, front, 6)]
+
+
+def _whole_factors(levels: "Sequence[tuple[str, ...]]", most: int) -> int:
+    """Return how many rows of levels to show, at most so many, without parting those of a factor."""
+    if len(levels) <= most:
+        return len(levels)
+    return max(k for k in range(most + 1) if k == 0 or levels[k - 1][0] != levels[k][0])

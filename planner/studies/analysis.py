@@ -1,5 +1,6 @@
 """What a dataset says: quantiles, probability of FAIL, first-order propagation, sensitivity indices, Pareto front."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,6 +29,8 @@ _LEAST_GIVEN = 100
 """Samples below which RBD-FAST, with its 10 harmonics, estimates no index."""
 
 _RESAMPLES = 200
+
+_NUMBER = re.compile(r"-?\d[\d.e+-]*")
 
 
 @dataclass(frozen=True)
@@ -247,10 +250,16 @@ class Results:
         return tuple(sorted(counts.items(), key=lambda pair: -pair[1]))
 
     def reasons(self, status: str) -> tuple[tuple[str, int], ...]:
-        """Return the reasons of refused or infeasible points, and how many have them, the most frequent first."""
-        reasons = list(self.column("reason")[self.column("status") == status])
-        counts = {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
-        return tuple(sorted(counts.items(), key=lambda pair: -pair[1]))
+        """Return the reasons of refused or infeasible points, and how many have them, the most frequent first.
+
+        Reasons that differ in numbers alone are one: that of the first point.
+        """
+        counts: dict[str, tuple[str, int]] = {}
+        for reason in self.column("reason")[self.column("status") == status]:
+            alike = _NUMBER.sub("#", reason)
+            first, count = counts.get(alike, (reason, 0))
+            counts[alike] = first, count + 1
+        return tuple(sorted(counts.values(), key=lambda pair: -pair[1]))
 
     def summary(self, name: str) -> ResponseSummary | None:
         """Return what the samples say of a response; None where no sample has it.
@@ -340,13 +349,19 @@ class Results:
         return [Index(name, *map(float, row)) for name, *row in zip(names, *columns, strict=True)]
 
     def _factorial(self, values: Array) -> list[Index]:
-        """Return shares of the variance over a grid; combinations without a value are left out.
+        """Return shares of the variance over a grid.
 
         first = 1 - SS(y - mean of y at the factor's level) / SS(y - mean of y)
         total = SS(y - mean of y at the other factors' levels) / SS(y - mean of y)
+
+        Where combinations have no value, levels are left out until the rest is a whole grid: each
+        time the level with the largest share of them.
         """
-        known = np.isfinite(values)
-        y, levels = values[known], self.study.design.coordinates[known]
+        y, levels = values, self.study.design.coordinates
+        while not np.isfinite(y).all():
+            slabs = [levels[:, i] == level for i in range(levels.shape[1]) for level in np.unique(levels[:, i])]
+            worst = max(slabs, key=lambda slab: float(np.isnan(y[slab]).mean()))
+            y, levels = y[~worst], levels[~worst]
         if not len(y) or np.ptp(y) == 0.0:
             return []
         whole = _spread(y, np.zeros((len(y), 1)))

@@ -115,6 +115,8 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
             "distributed.worker.profile.enabled": False,
             "distributed.admin.tick.interval": "1s",
             "distributed.admin.system-monitor.interval": "10s",
+            # Each connection would keep its last 1,000 messages, with the study in every one.
+            "distributed.admin.low-level-log-length": 10,
             # Dask would have every array above 128 kB given back to the system at once; the next
             # sample would fetch the same pages again, which takes a tenth of its time.
             "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,

@@ -6,7 +6,8 @@ import numpy as np
 
 from planner.studies.analysis import FAILS, Index, Results, Swing
 from planner.studies.designs import DesignKind
-from planner.studies.report import decided_by, summaries
+from planner.studies.factors import Factor
+from planner.studies.report import summaries
 from planner.studies.responses import label
 
 if TYPE_CHECKING:
@@ -16,23 +17,30 @@ if TYPE_CHECKING:
 _PASS, _FAIL, _FRONT = "#0072b2", "#d55e00", "#009e73"
 _MOST_DOTS = 5000
 _MOST_BARS = 15
+_GOLDEN = 0.618034  # multiples of it, modulo 1, spread evenly
 
 
 def study_pictures(results: Results) -> dict[str, "Figure"]:
     """Return the figures of a study by title: those for which it has data."""
     pictures: dict[str, Figure] = {}
     found = summaries(results)
+    grid = results.study.design.kind is DesignKind.GRID
+    deciding = list(results.indices(FAILS))
+    if deciding:
+        pictures[f"What decides {FAILS}"] = _indices(FAILS, deciding, grid)
     for each in found:
         swings = [swing for swing in each.swings if swing.high > swing.low]
         if swings and each.nominal is not None:
             pictures[f"Tornado: {label(each.name)[0]}"] = _tornado(each.name, swings, each.nominal)
         if each.indices:
-            pictures[f"What decides {label(each.name)[0]}"] = _indices(each.name, list(each.indices))
-    scatter = _grid_map(results) if results.study.design.kind is DesignKind.GRID else None
-    if scatter is not None:
-        pictures["FAIL over the grid"] = scatter
-    elif results.study.design.kind is not DesignKind.GRID and found:
-        pictures["Samples"] = _scatter(results, found[0].name, decided_by(found[0]).rpartition(" (")[0] or decided_by(found[0]))
+            pictures[f"What decides {label(each.name)[0]}"] = _indices(each.name, list(each.indices), grid)
+    over = _grid_map(results) if grid else None
+    if over is not None:
+        pictures["FAIL over the grid"] = over
+    elif not grid and found:
+        ranked = [index.factor for index in (*deciding, *found[0].indices)] + [swing.factor for swing in found[0].swings]
+        factors = {factor.name: factor for factor in results.study.design.factors}
+        pictures["Samples"] = _scatter(results, found[0].name, factors[ranked[0]] if ranked else next(iter(factors.values())))
     if len(results.study.pareto) >= 2:
         pictures["Pareto front"] = _pareto(results)
     return pictures
@@ -79,38 +87,51 @@ def _tornado(name: str, swings: list[Swing], nominal: float) -> "Figure":
     return figure
 
 
-def _indices(name: str, indices: list[Index]) -> "Figure":
+def _indices(name: str, indices: list[Index], exact: bool) -> "Figure":
     shown = indices[:_MOST_BARS][::-1]
-    figure, axes = _figure(1.8 + 0.35 * len(shown))
+    figure, axes = _figure(2.0 + 0.35 * len(shown))
     places = np.arange(len(shown))
-    first = [index.first for index in shown]
-    axes.barh(places + 0.2, first, 0.38, xerr=[index.first_error for index in shown], color=_PASS, label="alone")
-    if all(index.total is not None for index in shown):
-        totals, errors = [index.total or 0.0 for index in shown], [index.total_error or 0.0 for index in shown]
-        axes.barh(places - 0.2, totals, 0.38, xerr=errors, color=_FRONT, label="with interactions")
+    totals = [index.total for index in shown if index.total is not None]
+    bars = [(0.2, [index.first for index in shown], [index.first_error for index in shown], _PASS, "alone")]
+    if len(totals) == len(shown):
+        bars.append((-0.2, totals, [index.total_error or 0.0 for index in shown], _FRONT, "with interactions"))
+    for shift, values, errors, color, said in bars:
+        axes.barh(places + shift, values, 0.38, xerr=None if exact else errors, color=color, label=said)
     axes.set_yticks(places, [index.factor for index in shown])
-    axes.set(xlabel=f"share of the variance of {label(name)[0].partition(' [')[0]} (Sobol index, 95 % interval)")
+    how = "exact over a grid" if exact else "Sobol index, 95 % interval"
+    axes.set(xlabel=f"share of the variance of {label(name)[0].partition(' [')[0]} ({how})")
     axes.grid(alpha=0.3, axis="x")
-    axes.legend(frameon=False)
+    figure.legend(frameon=False, ncols=2, loc="outside lower center")
     return figure
 
 
-def _scatter(results: Results, response: str, factor: str) -> "Figure":
+def _scatter(results: Results, response: str, factor: Factor) -> "Figure":
+    """Draw a response over a factor; samples without a motion, which have no response, stand at the top."""
     figure, axes = _figure()
-    names = [each.name for each in results.study.design.factors]
-    i = names.index(factor) if factor in names else 0
-    chosen = np.flatnonzero(results.drawn)[:_MOST_DOTS]
+    i = results.study.design.factors.index(factor)
+    chosen = np.flatnonzero(results.drawn & ~results.refused)[:_MOST_DOTS]
     text, size = label(response)
     x, y = results.study.design.coordinates[chosen, i], results.numbers(response)[chosen] / size
-    fails = results.numbers(FAILS)[chosen] == 1.0
-    axes.scatter(x[~fails], y[~fails], s=8, color=_PASS, label="does not FAIL")
-    axes.scatter(x[fails], y[fails], s=14, color=_FAIL, marker="x", label="FAIL")
-    levels = results.study.design.factors[i].levels
-    if levels:
-        axes.set_xticks(range(len(levels)), [str(level) for level in levels])
-    axes.set(xlabel=names[i], ylabel=text)
+    if factor.levels:
+        x = x + 0.5 * (np.arange(len(x)) * _GOLDEN % 1.0 - 0.5)  # side by side, where many are equal
+        axes.set_xticks(range(len(factor.levels)), [_label(level) for level in factor.levels])
+    fails, moves = results.numbers(FAILS)[chosen] == 1.0, np.isfinite(y)
+    for mask, color, mark, said in (
+        (moves & ~fails, _PASS, "o", "does not FAIL"),
+        (moves & fails, _FAIL, "x", "FAIL"),
+    ):
+        if mask.any():
+            axes.scatter(x[mask], y[mask], s=12, color=color, marker=mark, label=said)
+    if not moves.all():
+        top = np.full((~moves).sum(), 0.97)
+        across = axes.get_xaxis_transform()
+        axes.scatter(x[~moves], top, s=20, color=_FAIL, marker="|", label="FAIL: no motion", transform=across)
+        axes.margins(y=0.12)
+    beside = 0.05 * max(float(np.ptp(x)), 1e-9)  # marks at the top do not widen the axis by themselves
+    axes.set_xlim(float(x.min()) - beside, float(x.max()) + beside)
+    axes.set(xlabel=factor.name, ylabel=text)
     axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
+    figure.legend(frameon=False, ncols=3, loc="outside lower center")
     return figure
 
 
@@ -152,7 +173,8 @@ def _pareto(results: Results) -> "Figure":
     x, y, fails = results.numbers(x_name) / x_size, results.numbers(y_name) / y_size, results.numbers(FAILS)
     front = results.front(results.study.pareto)
     for mask, color, mark, said in ((fails == 0.0, _PASS, "o", "does not FAIL"), (fails == 1.0, _FAIL, "x", "FAIL")):
-        axes.scatter(x[mask], y[mask], s=18, color=color, marker=mark, label=said, alpha=0.5)
+        if np.isfinite(x[mask] + y[mask]).any():
+            axes.scatter(x[mask], y[mask], s=18, color=color, marker=mark, label=said, alpha=0.5)
     if rest:
         text, size = label(rest[0])
         third = results.numbers(rest[0])[front] / size
@@ -164,5 +186,5 @@ def _pareto(results: Results) -> "Figure":
         axes.plot(x[front], y[front], "o-", color=_FRONT, label="Pareto front", zorder=3)
     axes.set(xlabel=x_text, ylabel=y_text)
     axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
+    figure.legend(frameon=False, ncols=3, loc="outside lower center")
     return figure

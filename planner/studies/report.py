@@ -27,15 +27,17 @@ def sentences(results: Results) -> tuple[str, ...]:
     drawn = f"{len(results.refused):,} samples of {len(design.factors)} factors ({design.kind}, seed {study.seed})"
     how = f"{study.work}, {drawn}"
     counted = [
-        f"{int(mask.sum())} {word}" for mask, word in ((results.infeasible, "without a motion"), (results.refused, "refused"))
+        f"{mask.sum():,} {word}"
+        for mask, word in ((results.infeasible, "without a motion"), (results.refused, "refused"))
+        if mask.any()
     ]
     if found is None:
-        return asked, how, f"no sample could be checked; {', '.join(counted)}"
-    if study.design.kind is DesignKind.GRID:
-        answer = f"{found.fails} of {found.samples} FAIL; {', '.join(counted)}"
+        answer = "no sample could be checked"
+    elif study.design.kind is DesignKind.GRID:
+        answer = f"{found.fails} of {found.samples} FAIL"
     else:
-        answer = f"FAIL: {chance(found)}; {', '.join(counted)}"
-    return asked, how, answer
+        answer = f"FAIL: {chance(found)}"
+    return asked, how, "; ".join([answer, ", ".join(counted)] if counted else [answer])
 
 
 def chance(found: Probability) -> str:
@@ -87,14 +89,15 @@ def decided_by(found: ResponseSummary) -> str:
 
 def index_rows(results: Results, indices: Sequence[Index]) -> list[tuple[str, ...]]:
     """Return the rows of INDEX_HEADER."""
+    exact = results.study.design.kind is DesignKind.GRID
     laws = {factor.name: factor.law for factor in results.study.design.factors}
     return [
         (
             index.factor,
             f"{index.first:.3f}",
-            f"{index.first_error:.3f}" if index.first_error else "-",
+            "-" if exact else f"{index.first_error:.3f}",
             "-" if index.total is None else f"{index.total:.3f}",
-            f"{index.total_error:.3f}" if index.total_error else "-",
+            "-" if exact or index.total_error is None else f"{index.total_error:.3f}",
             laws[index.factor],
         )
         for index in indices
@@ -171,7 +174,8 @@ def notes(results: Results) -> tuple[str, ...]:
     factors = results.study.design.factors
     said = [f"{f.name}: {f.law}; {f.basis}: {f.source}" for f in factors]
     for status, word in ((REFUSED, "refused"), (INFEASIBLE, "without a motion")):
-        said += [f"{count} {word}: {reason}" for reason, count in results.reasons(status)[:_FEW]]
+        for reason, count in results.reasons(status)[:_FEW]:
+            said.append(f"{count:,} {word}{', such as' if count > 1 else ''}: {reason}")
     said += [f"tightest limit in {count:,} samples: {name}" for name, count in results.tightest()[:_FEW]]
     return tuple(said)
 

@@ -23,7 +23,9 @@ from planner.studies.factors import Factor
 from planner.studies.tables import Tree, Value, is_numeric, merged, require_key, texts
 from planner.timing.profile import SHORTEST
 
-_FOLDER = Path(str(files("planner.studies") / "named_studies"))
+NAMED_STUDIES = Path(str(files("planner.studies") / "named_studies"))
+"""Folder of the studies that come with the toolkit."""
+
 _CHUNKS = 100
 _LEAST_CHUNK, _MOST_CHUNK = 10, 250
 """Samples of a chunk, where a study of about _CHUNKS of them would have fewer or more."""
@@ -164,7 +166,7 @@ class Study:
 
 def named_studies() -> tuple[str, ...]:
     """Return the names of the studies that come with the toolkit."""
-    return tuple(sorted(path.stem for path in _FOLDER.glob("*.toml")))
+    return tuple(sorted(path.stem for path in NAMED_STUDIES.glob("*.toml")))
 
 
 def load_study(
@@ -190,7 +192,7 @@ def load_study(
         InputError: a file cannot be read or is malformed, a key is unknown, or a distribution is
             impossible; the message names it.
     """
-    file = named_file(_FOLDER, name, "study")
+    file = named_file(NAMED_STUDIES, name, "study")
     table = validated(str(file), parse_toml(file), _StudyTable)
     inputs = _inputs(table, boom, catalogue, links)
     for joint in table.joints:
@@ -203,7 +205,8 @@ def load_study(
     if table.move is None:
         work = f"mission {table.mission}"
     else:
-        work = f"{table.move.start} to {table.move.goal}, {table.move.profile}"
+        varied = any("profile" in factor.keys for factor in factors)
+        work = f"{table.move.start} to {table.move.goal}" + ("" if varied else f", {table.move.profile}")
     return Study(
         name=table.name,
         question=table.question,

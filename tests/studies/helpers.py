@@ -77,7 +77,7 @@ def results_of(
     columns = {
         "point": [points.point(i) for i in range(len(y))],
         "status": np.where(off, "refused", "done").tolist(),
-        "reason": ["no boom" if bad else None for bad in off],
+        "reason": [f"the mass is -{i}.5e-3 kg" if bad else None for i, bad in enumerate(off)],
         "verdict": [None if bad else "FAIL" if value > fail_above else "PASS" for bad, value in zip(off, y, strict=True)],
         "tightest": ["y"] * len(y),
         "y": np.where(off, np.nan, y),

@@ -9,7 +9,7 @@ from boom_model import InputError
 from planner.studies.analysis import FAILS
 from planner.studies.designs import DesignKind
 from planner.studies.factors import Factor
-from planner.studies.report import front_rows, response_rows, to_json, told
+from planner.studies.report import front_rows, notes, response_rows, to_json, told
 from tests.studies.helpers import normal, results_of, uniform
 
 G = np.array([0.0, 1.0, 4.5, 9.0])
@@ -75,6 +75,19 @@ def test_a_grid_gives_exact_shares_of_the_variance(tmp_path):
     whole = parts.sum()
     np.testing.assert_allclose([a.first, b.first], parts[:2] / whole, rtol=1e-12)
     np.testing.assert_allclose([a.total, b.total], (parts[:2] + parts[2]) / whole, rtol=1e-12)
+    fourth = [*factors, Factor("d", (), False, levels=(0.0, 1.0))]
+    gaps = results_of(  # without a value at most combinations with d = 1
+        tmp_path,
+        lambda x: (2 * x[:, 0] - 1) + (x[:, 1] - 1) * (2 + (2 * x[:, 0] - 1)),
+        fourth,
+        DesignKind.GRID,
+        1,
+        refused=[1, 3, 5, 7],
+    )
+    shares = {index.factor: (index.first, index.total) for index in gaps.indices("y")}
+    assert shares["a"] == pytest.approx((a.first, a.total))
+    assert shares["b"] == pytest.approx((b.first, b.total))
+    assert shares["d"] == pytest.approx((0.0, 0.0))
     assert told(("a", "b"), [("-", "1"), ("-", "-")]) == (("b",), [("1",), ("-",)])
 
 
@@ -120,7 +133,8 @@ def test_refused_samples_are_in_no_probability(tmp_path):
         tmp_path, lambda x: x[:, 0], factors, DesignKind.LATIN_HYPERCUBE, 100, fail_above=0.5, refused=[10, 11, 12]
     )
     assert made.fails().samples == 97
-    assert made.reasons("refused") == (("no boom", 3),)
+    assert made.reasons("refused") == (("the mass is -10.5e-3 kg", 3),)
+    assert "3 refused, such as: the mass is -10.5e-3 kg" in notes(made)
 
 
 def test_first_order_propagation_is_exact_where_the_response_is_linear(tmp_path):
