@@ -15,6 +15,7 @@ from planner.field.polygons import rings_of
 
 _LABELLED = 120  # plots with names
 _COLOURS = "viridis"
+_DARK = 0.6  # share below which its colours are dark
 
 
 def map_figure(
@@ -31,8 +32,9 @@ def map_figure(
     if coverage is not None:
         figure.colorbar(scale, ax=axes, label="share seen")
     if len(outlines) <= _LABELLED:
-        for name, outline in zip(plots.names, outlines, strict=True):
-            axes.annotate(name, outline.mean(axis=0), ha="center", va="center", fontsize=6)
+        dark = np.zeros(len(outlines), dtype=bool) if coverage is None else coverage < _DARK
+        for name, outline, light in zip(plots.names, outlines, dark, strict=True):
+            axes.annotate(name, outline.mean(axis=0), ha="center", va="center", fontsize=6, color="w" if light else "k")
     if track is not None:
         axes.plot(*track.T, color="#8a4b16", linewidth=1.2, label="track of the mount")
     if points is not None and len(points):

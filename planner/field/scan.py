@@ -119,21 +119,24 @@ def plan_scan(boom: Boom, plots: PlotMap, task: ScanTask, track: Track = iter) -
     _check(task)
     rows = rows_of(plots)
     beside = tuple(each for row in rows for each in row.plots)
-    periods = {each.plot: row.period for row in rows for each in row.plots}
+    period = min(row.period for row in rows)
     offset = _best_offset(boom, beside[0], task) if task.offset is None else task.offset
+    stopped = task.speed is None
+    wide = [row.width for row in rows for _ in row.plots]
+    across = [each.y if stopped else width for each, width in zip(beside, wide, strict=True)]  # a pass has one line for all
     kinds: dict[tuple[float, ...], list[int]] = {}
     for k, each in enumerate(beside):
-        kinds.setdefault(tuple(np.round((*each.x, *each.y, periods[each.plot]), _SAME)), []).append(k)
+        kinds.setdefault(tuple(np.round((*each.x, *each.y, *across[k]), _SAME)), []).append(k)
     firsts = [beside[members[0]] for members in kinds.values()]
-    passes, options = _passes(boom, firsts, [periods[each.plot] for each in firsts], offset, task)
+    passes, options = _passes(boom, firsts, max(len(_lines(y, task)) for y in across), period, offset, task)
     visits: list[Visit] = [Visit((), (), 0.0, "")] * len(beside)
     moves: dict[str, Move] = {}
     seen: dict[int, tuple[float, float, float, float]] = {}
-    for kind in track(list(kinds)):
+    for number, kind in enumerate(track(list(kinds))):
         first = beside[kinds[kind][0]]
-        visit = _visit(boom, first, offset, task)
+        visit = replace(_visit(boom, first, across[kinds[kind][0]], offset, task), kind=number)
         if passes and visit.lines and not visit.reason:
-            visit = replace(visit, ground=_ground(boom, first, periods[first.plot], offset, task, passes))
+            visit = replace(visit, ground=_ground(boom, first, period, offset, task, passes))
         found = _looked(boom, first, visit, offset, task, moves)
         for k in kinds[kind]:
             visits[k], seen[k] = visit, found
@@ -190,8 +193,7 @@ def _lines(y: tuple[float, float], task: ScanTask) -> Array:
 
 def lines_of(row: Row, task: ScanTask) -> Array:
     """Return where the middles of a row's lines are, to the left of its middle [m]."""
-    low, high = min(plot.y[0] for plot in row.plots), max(plot.y[1] for plot in row.plots)
-    return _lines((low, high), task)
+    return _lines(row.width, task)
 
 
 def _strips(y: tuple[float, float], task: ScanTask, passes: int) -> list[tuple[float, float]]:
@@ -203,7 +205,7 @@ def _strips(y: tuple[float, float], task: ScanTask, passes: int) -> list[tuple[f
 
 
 def _passes(
-    boom: Boom, kinds: list[Beside], periods: list[float], offset: float, task: ScanTask
+    boom: Boom, kinds: list[Beside], most: int, period: float, offset: float, task: ScanTask
 ) -> tuple[int, tuple[PassOption, ...]]:
     """Return the fewest passes with lines over the ground at the task's speed, and what every number of passes allows.
 
@@ -211,10 +213,9 @@ def _passes(
     """
     if task.speed is None:
         return 0, ()
-    most = max(len(_lines(each.y, task)) for each in kinds)
     options, chosen = [], 0
     for passes in range(1, most):
-        option = _option(boom, kinds, periods, offset, task, passes)
+        option = _option(boom, kinds, period, offset, task, passes)
         options.append(option)
         if not chosen and task.passes in (None, passes) and option.speed >= task.speed * (1.0 - _ROUNDING):
             chosen = passes
@@ -235,10 +236,10 @@ def _enough(options: list[PassOption], speed: float) -> int:
     return next(option.passes for option in options if option.speed >= speed)
 
 
-def _option(boom: Boom, kinds: list[Beside], periods: list[float], offset: float, task: ScanTask, passes: int) -> PassOption:
+def _option(boom: Boom, kinds: list[Beside], period: float, offset: float, task: ScanTask, passes: int) -> PassOption:
     """Return the largest speed of a number of passes over the kinds of plot; what is asked for is planned in full."""
     speed, sweep, limit = np.inf, 0.0, "the lines over the plot"
-    for each, period in zip(kinds, periods, strict=True):
+    for each in kinds:
         along = _spread(*each.x, task.footprint[1], task.overlap)
         for low, high in _strips(each.y, task, passes):
             y, sweep = (low + offset, high + offset), max(sweep, high - low)
@@ -293,9 +294,9 @@ def _best_offset(boom: Boom, plot: Beside, task: ScanTask) -> float:
     return float(np.round(best[len(best) // 2], 6))
 
 
-def _visit(boom: Boom, plot: Beside, offset: float, task: ScanTask) -> Visit:
-    """Return where the vehicle stops at a plot, and which lines of it the boom reaches."""
-    lines = _lines(plot.y, task) + offset
+def _visit(boom: Boom, plot: Beside, y: tuple[float, float], offset: float, task: ScanTask) -> Visit:
+    """Return where the vehicle stops at a plot, and which lines between two edges y the boom reaches."""
+    lines = _lines(y, task) + offset
     reached = [float(y) for y in lines if _window(boom, np.array([y]), task, 0.0) >= 0.0]
     lost = [f"{y:.2f}" for y in lines if float(y) not in reached]
     reason = f"the tip reaches no line at {', '.join(lost)} m beside the mount, {task.tip_height:g} m over it" if lost else ""
@@ -362,9 +363,9 @@ def _ground_looks(boom: Boom, plot: Beside, visit: Visit, task: ScanTask, moves:
     for number, both in enumerate(visit.ground):
         crossing = both[0].crossing
         for side, each in enumerate(both):
-            moves[ground_name(number, side)] = ground_move(boom, each, speed)
+            moves[ground_name(visit.kind, number, side)] = ground_move(boom, each, speed)
             _planned(boom, *each.crossing.forward, task, moves)
-        move = moves[ground_name(number, 0)]
+        move = moves[ground_name(visit.kind, number, 0)]
         energy += _work(boom, move) + _work(boom, moves[" to ".join(both[0].crossing.forward)])
         begin = first_line(plot, crossing.lines, task) + crossing.begin
         for phase in range(_PHASES):

@@ -111,7 +111,7 @@ def _over_ground(day: Day, row: Row, work: Work, here: str) -> Iterator[Leg]:
             if last is not None:
                 way, what = np.vstack([last, ends[:1]]), "drive" if position else "back"
                 yield _driven(day, what, way, row.ahead, here, start, speed if position else None)
-            name = ground_name(number, side % len(visit.ground[number]))
+            name = ground_name(visit.kind, number, side % len(visit.ground[number]))
             yield Leg("pass", day.moves[name].report.duration, ends, row.ahead, (name,), start, goal, each.plot)
             last, here, side = ends[1:], goal, (side + crossing.lines) % 2
 
@@ -211,25 +211,25 @@ def _sweep(scan: "Scan", targets: tuple[str, ...], hold: str) -> list[str]:
 def _ground_steps(scan: "Scan") -> list[str]:
     """Return the steps of lines over the ground: each move as samples, the way forward, and a hold."""
     passed = [leg for leg in scan.legs if leg.what == "pass"]
-    visit = next(visit for visit in scan.visits if visit.ground)
+    kinds = {visit.kind: visit for visit in scan.visits if visit.ground}
+    sweeps = [(kind, number, sides) for kind, visit in kinds.items() for number, sides in enumerate(visit.ground)]
     forward = {
-        ground_name(n, k): " to ".join(each.crossing.forward)
-        for n, sides in enumerate(visit.ground)
-        for k, each in enumerate(sides)
+        ground_name(kind, number, k): each.crossing.forward for kind, number, sides in sweeps for k, each in enumerate(sides)
     }
-    moved = sum(scan.moves[name].report.duration for leg in passed for name in (leg.moves[0], forward[leg.moves[0]]))
+    done = [(leg.moves[0], " to ".join(forward[leg.moves[0]])) for leg in passed]
+    moved = sum(scan.moves[name].report.duration for names in done for name in names)
     hold = f"{max((scan.duration - moved) / max(len(passed), 1), _SHORTEST):.4f}"
     lines: list[str] = []
-    for number, sides in enumerate(visit.ground):
-        names = [ground_name(number, side) for side in range(len(sides))]
+    for kind, number, sides in sweeps:
+        names = [ground_name(kind, number, side) for side in range(len(sides))]
         count = sum(leg.moves[0] in names for leg in passed)
         each = [
             [
                 *("", "[[steps]]", f"motion = {_samples(scan.moves[name])}"),
-                *_step(scan, side.crossing.forward[1], line=True),
+                *_step(scan, forward[name][1], line=True),
                 *("", "[[steps]]", f"hold_s = {hold}"),
             ]
-            for name, side in zip(names, sides, strict=True)
+            for name in names
         ]
         lines += ["", "[[steps]]", f'to = "{_joints(scan.moves[names[0]])}"', f'profile = "{scan.task.profile}"']
         if count >= len(names):

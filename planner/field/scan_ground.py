@@ -35,6 +35,8 @@ from planner.timing.time_law import Motion, TimeLaw
 DOWN = -np.pi / 2.0
 _SHARES = (0.6, 0.75, 0.9)
 """Tried: share of the travel from plot to plot in which the tip is over the ground."""
+_LONGEST, _LEAST = 1.5, 1.0
+"""That travel counts up to 1.5 times what the lines span, or 1 m: the tip falls back by the rest."""
 _WEIGHTS = (1.0, 1.6)
 """Tried: travel of a crossing over that of a step."""
 _FEW_LOOKS, _LOOKS = 201, 1001
@@ -189,10 +191,11 @@ def fastest_crossing(
         profile: of the move forward; jerk limits hold everywhere with "jerk-limited".
     """
     rule = parse_constraint(constraint)
+    longest = min(period, max(_LONGEST * lines * spacing, _LEAST))
     tried: list[tuple[float, Crossing]] = []
     for share in _SHARES:
         for weight in _WEIGHTS:
-            step = share * period / (lines * (1.0 + weight))
+            step = share * longest / (lines * (1.0 + weight))
             crossing = Crossing(y, lines, spacing, period, height, weight * step, step)
             pieces = crossing.pieces()
             some = (*pieces[:3], pieces[2 * (lines // 2) - 1], pieces[-2])

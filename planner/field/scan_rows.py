@@ -47,6 +47,11 @@ class Row:
         return min(p.along + p.x[0] for p in self.plots), max(p.along + p.x[1] for p in self.plots)
 
     @property
+    def width(self) -> tuple[float, float]:
+        """From the right edge of the plots to the left one, from the row's middle line [m]."""
+        return min(plot.y[0] for plot in self.plots), max(plot.y[1] for plot in self.plots)
+
+    @property
     def period(self) -> float:
         """Least way from one plot to the next; of a single plot, its own length."""
         along = [plot.along for plot in self.plots]

@@ -12,7 +12,7 @@ from planner.field.earth import geodetic_of
 from planner.field.extra import library
 from planner.field.plots import PlotMap
 from planner.field.scan import Scan
-from planner.field.scan_report import assumptions, day_line, headline, pass_lines, scan_report
+from planner.field.scan_report import assumptions, day_line, headline, pass_lines, scan_report, seen_line
 from planner.field.scan_timeline import Timeline, seen_so_far, timeline
 from planner.recording.layout import eye_on, scene, shown_beside, text
 from planner.recording.legend import legend_view, log_legend
@@ -81,12 +81,11 @@ def _blueprint(line: Timeline) -> rrb.Blueprint:
 
 
 def _answer(scan: Scan) -> str:
-    low, high = scan.coverage.min(), scan.coverage.max()
     lost = [f"{name}: {why}" for name, why in scan.unreachable.items()]
     frame = scan.plots.frame
     place = f"{np.degrees(frame.latitude):.7f}, {np.degrees(frame.longitude):.7f} deg"
     lines = [
-        f"**{low:.1%} to {high:.1%} of each plot seen**, each spot {scan.overlap.mean():.1f} times.",
+        f"**{seen_line(scan)}.**",
         f"{headline(scan)}.",
         f"{day_line(scan)}.",
         *pass_lines(scan),

@@ -98,6 +98,20 @@ def test_one_pass_covers_the_plots(small):
     assert seen.share[-1].min() >= 0.985  # on points 5 cm apart
 
 
+@pytest.fixture(scope="module")
+def gap() -> Scan:
+    """A row without its second plot: the vehicle goes on to the third one."""
+    whole = small_map()
+    names, rings = list(whole.names)[:3], [list(each) for each in whole.rings][:3]
+    few = PlotMap.of(names, rings, rows=list(whole.rows)[:3], ranges=list(whole.ranges)[:3], height=480.0)
+    return plan_scan(BOOM, few, ScanTask((0.5, 0.5), speed=SPEED, profile="cubic"))
+
+
+def test_a_gap_in_a_row_is_no_hindrance(gap):
+    assert gap.passes == 1
+    assert gap.coverage.min() >= 0.99
+
+
 def test_two_passes_with_an_odd_number_of_lines(twice):
     assert twice.passes == 2
     assert twice.visits[0].ground[0][0].crossing.lines == 5
@@ -109,7 +123,7 @@ def test_two_passes_with_an_odd_number_of_lines(twice):
     }
 
 
-@pytest.mark.parametrize("which", ["small", "twice"])
+@pytest.mark.parametrize("which", ["small", "twice", "gap"])
 def test_the_day_is_continuous(which, request):
     """Mount and joints have no jump from one leg to the next, and the vehicle is no faster than it drives."""
     step, small = 0.1, request.getfixturevalue(which)
