@@ -53,9 +53,8 @@ class Row:
 
     @property
     def period(self) -> float:
-        """Least way from one plot to the next; of a single plot, its own length."""
-        along = [plot.along for plot in self.plots]
-        return min(np.diff(along), default=self.plots[0].x[1] - self.plots[0].x[0])
+        """Least way from one plot to the next; infinite for a single plot."""
+        return float(min(np.diff([plot.along for plot in self.plots]), default=np.inf))
 
     def at(self, along: float, offset: float) -> Array:
         """Return the mount's place (2,) at a way along the row, `offset` to the right of its middle."""
