@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from planner.checks.rows import Verdict
 from planner.field.scan import Scan
 from planner.field.scan_day import STARTS
 from planner.reports.markdown import section, table
@@ -81,7 +82,9 @@ def scan_columns(scan: Scan) -> dict[str, list[Any]]:
 
 def scan_report(scan: Scan, failed: str = "") -> str:
     """Return the report in Markdown; its first paragraph is the verdict."""
-    verdict = f"FAIL: {failed}" if failed else f"INCOMPLETE: nothing fails, some drives have no data; {seen_line(scan)}"
+    open_ = any(move.report.verdict is Verdict.INCOMPLETE for move in scan.moves.values())
+    fine = "INCOMPLETE: nothing fails, some drives have no data" if open_ else "PASS: nothing fails"
+    verdict = f"FAIL: {failed}" if failed else f"{fine}; {seen_line(scan)}"
     said = [headline(scan), day_line(scan), *pass_lines(scan)]
     lines = ["# Row scan", "", verdict, *(line for text in said for line in ("", f"{text[0].upper()}{text[1:]}."))]
     lines += ["", "## Plots", ""]
