@@ -129,7 +129,7 @@ def scan(
     as_json: bool,
     **figures: Any,
 ) -> int:
-    """Plan a row scan: where the vehicle stops or passes, the boom's moves, and the coverage of each plot.
+    """Plan a row scan: stops or passes, the boom's moves, and the coverage of each plot.
 
     \b
     Examples:

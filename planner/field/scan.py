@@ -1,4 +1,4 @@
-"""A row scan: where the vehicle stops or how often it drives past, what the boom does there, and what of each plot is seen.
+"""A row scan: stops or passes of the vehicle, the boom's moves, and what of each plot is seen.
 
 The vehicle drives along each row of plots, to and fro from row to row, with the plots on its left.
 With stops, the boom sweeps lines of the tip along the row, at one pitch and height, beside each
@@ -86,7 +86,7 @@ class Scan:
 
     @cached_property
     def track(self) -> Array:
-        """(m, 2) of the mount at its stops, or at the ends of its passes, in the plane of the map [m]."""
+        """(m, 2) of the mount at its stops or the ends of its passes, in the map's plane [m]."""
         kind = "stop" if self.task.speed is None else "pass"
         return np.concatenate([leg.way for leg in self.legs if leg.what == kind] or [np.empty((0, 2))])
 
@@ -173,12 +173,12 @@ def _check(task: ScanTask) -> None:
 
 
 def _fastest(task: ScanTask) -> float:
-    """Return the speed [m/s] at which the footprints of a sensor that stands still beside the vehicle overlap as asked."""
+    """Return the speed [m/s] up to which footprints of a still boom overlap as asked."""
     return task.footprint[1] * (1.0 - task.overlap) * task.rate
 
 
 def _spread(low: float, high: float, side: float, overlap: float) -> Array:
-    """Return the middles of the fewest footprints of a side that lie between two edges, overlapping [m]."""
+    """Return the middles [m] of the fewest overlapping footprints between two edges."""
     width = high - low
     if side >= width:
         return np.array([0.5 * (low + high)])
@@ -197,7 +197,7 @@ def lines_of(row: Row, task: ScanTask) -> Array:
 
 
 def _strips(y: tuple[float, float], task: ScanTask, passes: int) -> list[tuple[float, float]]:
-    """Return from where to where the tip goes across a plot in every pass [m]; the strips overlap as lines do."""
+    """Return from where to where [m] the tip goes in every pass; strips overlap as lines do."""
     side = task.footprint[0]
     sweep = ((y[1] - y[0]) + (passes - 1) * task.overlap * side) / passes - side
     lows = np.linspace(y[0] + side / 2.0, y[1] - side / 2.0 - sweep, passes)
@@ -207,7 +207,7 @@ def _strips(y: tuple[float, float], task: ScanTask, passes: int) -> list[tuple[f
 def _passes(
     boom: Boom, kinds: list[Beside], most: int, period: float, offset: float, task: ScanTask
 ) -> tuple[int, tuple[PassOption, ...]]:
-    """Return the fewest passes with lines over the ground at the task's speed, and what every number of passes allows.
+    """Return the fewest passes over the ground at the task's speed, and what each number allows.
 
     It is 0 where the boom stands still over one line in each pass.
     """
@@ -237,7 +237,7 @@ def _enough(options: list[PassOption], speed: float) -> int:
 
 
 def _option(boom: Boom, kinds: list[Beside], period: float, offset: float, task: ScanTask, passes: int) -> PassOption:
-    """Return the largest speed of a number of passes over the kinds of plot; what is asked for is planned in full."""
+    """Return the largest speed of a number of passes; one that is asked for is planned in full."""
     speed, sweep, limit = np.inf, 0.0, "the lines over the plot"
     for each in kinds:
         along = _spread(*each.x, task.footprint[1], task.overlap)
@@ -272,7 +272,10 @@ def _ground(
 
 
 def _window(boom: Boom, lines: Array, task: ScanTask, most: float) -> float:
-    """Return how far the tip may go to either side on every line, in steps of 0.1 m; negative where a line is out of reach."""
+    """Return how far the tip may go to either side on every line, in steps of 0.1 m.
+
+    It is negative where a line is out of reach.
+    """
     half = -1.0
     constraint = parse_constraint(task.constraint)
     for reach in np.arange(0.0, most + _WINDOW, _WINDOW):
@@ -295,7 +298,7 @@ def _best_offset(boom: Boom, plot: Beside, task: ScanTask) -> float:
 
 
 def _visit(boom: Boom, plot: Beside, y: tuple[float, float], offset: float, task: ScanTask) -> Visit:
-    """Return where the vehicle stops at a plot, and which lines between two edges y the boom reaches."""
+    """Return the stops at a plot, and which lines between two edges y the boom reaches."""
     lines = _lines(y, task) + offset
     reached = [float(y) for y in lines if _window(boom, np.array([y]), task, 0.0) >= 0.0]
     lost = [f"{y:.2f}" for y in lines if float(y) not in reached]
@@ -357,7 +360,7 @@ def _planned(boom: Boom, start: str, goal: str, task: ScanTask, moves: dict[str,
 
 
 def _ground_looks(boom: Boom, plot: Beside, visit: Visit, task: ScanTask, moves: dict[str, Move]) -> tuple[list[Array], float]:
-    """Plan the moves over the ground; return the footprints for every phase of the sensor's clock, and the energy."""
+    """Plan the moves over the ground; return the footprints for every phase, and the energy."""
     speed, energy = task.speed or 0.0, 0.0
     looks: list[list[Array]] = [[] for _ in range(_PHASES)]
     for number, both in enumerate(visit.ground):
@@ -389,7 +392,7 @@ def _work(boom: Boom, move: Move) -> float:
 
 
 def _seen(plot: Beside, offset: float, looks: list[Array]) -> tuple[float, float]:
-    """Return the share of a plot that footprints (n, 4, 2) see, and how often; the worst of several looks."""
+    """Return the share of a plot that footprints (n, 4, 2) see, and how often; the worst look."""
     shapely = library("shapely")
     area = shapely.box(plot.x[0], plot.y[0] + offset, plot.x[1], plot.y[1] + offset)
     found = []

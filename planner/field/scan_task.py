@@ -1,4 +1,4 @@
-"""What a row scan is to do, and what of it is planned: visits of plots, legs of the vehicle's day."""
+"""What a row scan is to do, and what is planned: visits of plots, legs of the day."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -104,7 +104,7 @@ class Leg:
 
 
 def targets_of(visit: Visit, task: ScanTask) -> tuple[str, ...]:
-    """Return the targets of the tip over one stop, to and fro from line to line; or in every pass."""
+    """Return the targets of the tip over one stop, to and fro, or in every pass."""
     targets = []
     for number, y in enumerate(visit.lines):
         half = visit.half

@@ -1,4 +1,4 @@
-"""Recording of a row scan: the vehicle drives through the field, the boom works, and a map shows what was seen."""
+"""Recording of a row scan: the vehicle drives, the boom works, a map shows what was seen."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ _SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def write_scan_recording(path: str | Path, boom: Boom, scan: Scan) -> None:
-    """Write the day of a scan in east, north, up [m], and a map whose plots and track need no network.
+    """Write the day of a scan in east, north, up [m], and a map that needs no network.
 
     /answer, /report             what was asked and found
     /world/mount, /world/boom    the vehicle and the boom
@@ -68,7 +68,10 @@ def write_scan_recording(path: str | Path, boom: Boom, scan: Scan) -> None:
 
 
 def _blueprint(line: Timeline) -> rrb.Blueprint:
-    """Return the layout; the map asks a server for its background, so it is shown only when its tab is opened."""
+    """Return the layout.
+
+    The map asks a server for its background, so it is shown only when its tab is opened.
+    """
     around = np.column_stack([line.mount, np.zeros(len(line.t))])
     view = scene("Field: east, north, up [m]", eye_on(around, 0.8, away=0.75))
     middle, size = (around.min(axis=0) + around.max(axis=0)) / 2.0, float(np.ptp(around, axis=0).max())
