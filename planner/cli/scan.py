@@ -129,7 +129,7 @@ def scan(
     as_json: bool,
     **figures: Any,
 ) -> int:
-    """Plan a row scan: where the vehicle stops or passes, the boom's moves, and the coverage of each plot.
+    """Plan a row scan: stops or passes, the boom's moves, and the coverage of each plot.
 
     \b
     Examples:
@@ -211,12 +211,11 @@ def _failed(found: "Scan") -> str:
 
 
 def _print_scan(found: "Scan", whole: bool) -> None:
-    from planner.field.scan_report import assumptions, day_line, headline, pass_lines
+    from planner.field.scan_report import assumptions, day_line, headline, pass_lines, seen_line
 
     n = len(found.plots.names)
     print_lines(None, [headline(found)])
-    share = f"{found.coverage.min():.1%} to {found.coverage.max():.1%} of each plot seen"
-    print_lines(None, [f"{share}, each spot {found.overlap.mean():.1f} times", day_line(found)])
+    print_lines(None, [seen_line(found), day_line(found)])
     print_lines(None, pass_lines(found))
     listed = list(zip(found.plots.names, found.coverage, found.overlap, found.seconds, found.energy, strict=True))
     rows = [(name, f"{c:.1%}", f"{o:.1f}", f"{t:.1f} s", f"{e:.1f} J") for name, c, o, t, e in listed]

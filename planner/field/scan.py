@@ -1,4 +1,4 @@
-"""A row scan: where the vehicle stops or how often it drives past, what the boom does there, and what of each plot is seen.
+"""A row scan: stops or passes of the vehicle, the boom's moves, and what of each plot is seen.
 
 The vehicle drives along each row of plots, to and fro from row to row, with the plots on its left.
 With stops, the boom sweeps lines of the tip along the row, at one pitch and height, beside each
@@ -86,7 +86,7 @@ class Scan:
 
     @cached_property
     def track(self) -> Array:
-        """(m, 2) of the mount at its stops, or at the ends of its passes, in the plane of the map [m]."""
+        """(m, 2) of the mount at its stops or the ends of its passes, in the map's plane [m]."""
         kind = "stop" if self.task.speed is None else "pass"
         return np.concatenate([leg.way for leg in self.legs if leg.what == kind] or [np.empty((0, 2))])
 
@@ -119,21 +119,24 @@ def plan_scan(boom: Boom, plots: PlotMap, task: ScanTask, track: Track = iter) -
     _check(task)
     rows = rows_of(plots)
     beside = tuple(each for row in rows for each in row.plots)
-    periods = {each.plot: row.period for row in rows for each in row.plots}
+    period = min(row.period for row in rows)
     offset = _best_offset(boom, beside[0], task) if task.offset is None else task.offset
+    stopped = task.speed is None
+    wide = [row.width for row in rows for _ in row.plots]
+    across = [each.y if stopped else width for each, width in zip(beside, wide, strict=True)]  # a pass has one line for all
     kinds: dict[tuple[float, ...], list[int]] = {}
     for k, each in enumerate(beside):
-        kinds.setdefault(tuple(np.round((*each.x, *each.y, periods[each.plot]), _SAME)), []).append(k)
+        kinds.setdefault(tuple(np.round((*each.x, *each.y, *across[k]), _SAME)), []).append(k)
     firsts = [beside[members[0]] for members in kinds.values()]
-    passes, options = _passes(boom, firsts, [periods[each.plot] for each in firsts], offset, task)
+    passes, options = _passes(boom, firsts, max(len(_lines(y, task)) for y in across), period, offset, task)
     visits: list[Visit] = [Visit((), (), 0.0, "")] * len(beside)
     moves: dict[str, Move] = {}
     seen: dict[int, tuple[float, float, float, float]] = {}
-    for kind in track(list(kinds)):
+    for number, kind in enumerate(track(list(kinds))):
         first = beside[kinds[kind][0]]
-        visit = _visit(boom, first, offset, task)
+        visit = replace(_visit(boom, first, across[kinds[kind][0]], offset, task), kind=number)
         if passes and visit.lines and not visit.reason:
-            visit = replace(visit, ground=_ground(boom, first, periods[first.plot], offset, task, passes))
+            visit = replace(visit, ground=_ground(boom, first, period, offset, task, passes))
         found = _looked(boom, first, visit, offset, task, moves)
         for k in kinds[kind]:
             visits[k], seen[k] = visit, found
@@ -170,12 +173,12 @@ def _check(task: ScanTask) -> None:
 
 
 def _fastest(task: ScanTask) -> float:
-    """Return the speed [m/s] at which the footprints of a sensor that stands still beside the vehicle overlap as asked."""
+    """Return the speed [m/s] up to which footprints of a still boom overlap as asked."""
     return task.footprint[1] * (1.0 - task.overlap) * task.rate
 
 
 def _spread(low: float, high: float, side: float, overlap: float) -> Array:
-    """Return the middles of the fewest footprints of a side that lie between two edges, overlapping [m]."""
+    """Return the middles [m] of the fewest overlapping footprints between two edges."""
     width = high - low
     if side >= width:
         return np.array([0.5 * (low + high)])
@@ -190,12 +193,11 @@ def _lines(y: tuple[float, float], task: ScanTask) -> Array:
 
 def lines_of(row: Row, task: ScanTask) -> Array:
     """Return where the middles of a row's lines are, to the left of its middle [m]."""
-    low, high = min(plot.y[0] for plot in row.plots), max(plot.y[1] for plot in row.plots)
-    return _lines((low, high), task)
+    return _lines(row.width, task)
 
 
 def _strips(y: tuple[float, float], task: ScanTask, passes: int) -> list[tuple[float, float]]:
-    """Return from where to where the tip goes across a plot in every pass [m]; the strips overlap as lines do."""
+    """Return from where to where [m] the tip goes in every pass; strips overlap as lines do."""
     side = task.footprint[0]
     sweep = ((y[1] - y[0]) + (passes - 1) * task.overlap * side) / passes - side
     lows = np.linspace(y[0] + side / 2.0, y[1] - side / 2.0 - sweep, passes)
@@ -203,18 +205,17 @@ def _strips(y: tuple[float, float], task: ScanTask, passes: int) -> list[tuple[f
 
 
 def _passes(
-    boom: Boom, kinds: list[Beside], periods: list[float], offset: float, task: ScanTask
+    boom: Boom, kinds: list[Beside], most: int, period: float, offset: float, task: ScanTask
 ) -> tuple[int, tuple[PassOption, ...]]:
-    """Return the fewest passes with lines over the ground at the task's speed, and what every number of passes allows.
+    """Return the fewest passes over the ground at the task's speed, and what each number allows.
 
     It is 0 where the boom stands still over one line in each pass.
     """
     if task.speed is None:
         return 0, ()
-    most = max(len(_lines(each.y, task)) for each in kinds)
     options, chosen = [], 0
     for passes in range(1, most):
-        option = _option(boom, kinds, periods, offset, task, passes)
+        option = _option(boom, kinds, period, offset, task, passes)
         options.append(option)
         if not chosen and task.passes in (None, passes) and option.speed >= task.speed * (1.0 - _ROUNDING):
             chosen = passes
@@ -235,10 +236,10 @@ def _enough(options: list[PassOption], speed: float) -> int:
     return next(option.passes for option in options if option.speed >= speed)
 
 
-def _option(boom: Boom, kinds: list[Beside], periods: list[float], offset: float, task: ScanTask, passes: int) -> PassOption:
-    """Return the largest speed of a number of passes over the kinds of plot; what is asked for is planned in full."""
+def _option(boom: Boom, kinds: list[Beside], period: float, offset: float, task: ScanTask, passes: int) -> PassOption:
+    """Return the largest speed of a number of passes; one that is asked for is planned in full."""
     speed, sweep, limit = np.inf, 0.0, "the lines over the plot"
-    for each, period in zip(kinds, periods, strict=True):
+    for each in kinds:
         along = _spread(*each.x, task.footprint[1], task.overlap)
         for low, high in _strips(each.y, task, passes):
             y, sweep = (low + offset, high + offset), max(sweep, high - low)
@@ -271,7 +272,10 @@ def _ground(
 
 
 def _window(boom: Boom, lines: Array, task: ScanTask, most: float) -> float:
-    """Return how far the tip may go to either side on every line, in steps of 0.1 m; negative where a line is out of reach."""
+    """Return how far the tip may go to either side on every line, in steps of 0.1 m.
+
+    It is negative where a line is out of reach.
+    """
     half = -1.0
     constraint = parse_constraint(task.constraint)
     for reach in np.arange(0.0, most + _WINDOW, _WINDOW):
@@ -293,9 +297,9 @@ def _best_offset(boom: Boom, plot: Beside, task: ScanTask) -> float:
     return float(np.round(best[len(best) // 2], 6))
 
 
-def _visit(boom: Boom, plot: Beside, offset: float, task: ScanTask) -> Visit:
-    """Return where the vehicle stops at a plot, and which lines of it the boom reaches."""
-    lines = _lines(plot.y, task) + offset
+def _visit(boom: Boom, plot: Beside, y: tuple[float, float], offset: float, task: ScanTask) -> Visit:
+    """Return the stops at a plot, and which lines between two edges y the boom reaches."""
+    lines = _lines(y, task) + offset
     reached = [float(y) for y in lines if _window(boom, np.array([y]), task, 0.0) >= 0.0]
     lost = [f"{y:.2f}" for y in lines if float(y) not in reached]
     reason = f"the tip reaches no line at {', '.join(lost)} m beside the mount, {task.tip_height:g} m over it" if lost else ""
@@ -356,15 +360,15 @@ def _planned(boom: Boom, start: str, goal: str, task: ScanTask, moves: dict[str,
 
 
 def _ground_looks(boom: Boom, plot: Beside, visit: Visit, task: ScanTask, moves: dict[str, Move]) -> tuple[list[Array], float]:
-    """Plan the moves over the ground; return the footprints for every phase of the sensor's clock, and the energy."""
+    """Plan the moves over the ground; return the footprints for every phase, and the energy."""
     speed, energy = task.speed or 0.0, 0.0
     looks: list[list[Array]] = [[] for _ in range(_PHASES)]
     for number, both in enumerate(visit.ground):
         crossing = both[0].crossing
         for side, each in enumerate(both):
-            moves[ground_name(number, side)] = ground_move(boom, each, speed)
+            moves[ground_name(visit.kind, number, side)] = ground_move(boom, each, speed)
             _planned(boom, *each.crossing.forward, task, moves)
-        move = moves[ground_name(number, 0)]
+        move = moves[ground_name(visit.kind, number, 0)]
         energy += _work(boom, move) + _work(boom, moves[" to ".join(both[0].crossing.forward)])
         begin = first_line(plot, crossing.lines, task) + crossing.begin
         for phase in range(_PHASES):
@@ -388,7 +392,7 @@ def _work(boom: Boom, move: Move) -> float:
 
 
 def _seen(plot: Beside, offset: float, looks: list[Array]) -> tuple[float, float]:
-    """Return the share of a plot that footprints (n, 4, 2) see, and how often; the worst of several looks."""
+    """Return the share of a plot that footprints (n, 4, 2) see, and how often; the worst look."""
     shapely = library("shapely")
     area = shapely.box(plot.x[0], plot.y[0] + offset, plot.x[1], plot.y[1] + offset)
     found = []

@@ -1,4 +1,4 @@
-"""The day of a row scan: the vehicle's drives and turns, and the boom's moves, in time; and the same as a mission."""
+"""The day of a row scan: drives, turns and the boom's moves in time; the same as a mission."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -66,7 +66,10 @@ def legs(day: Day) -> tuple[Leg, ...]:
 
 
 def _driven(day: Day, what: str, way: Array, ahead: Array | None, here: str, goal: str, speed: float | None = None) -> Leg:
-    """Return a drive during which the tip goes from one target to another; it lasts as long as the longer of the two."""
+    """Return a drive during which the tip goes from one target to another.
+
+    It lasts as long as the longer of the two.
+    """
     moves = (day.planned(here, goal),) if here != goal else ()
     seconds = sum(day.moves[name].report.duration for name in moves)
     return Leg(what, max(length(way) / (speed or day.task.drive_speed), seconds), way, ahead, moves, here, goal)
@@ -111,7 +114,7 @@ def _over_ground(day: Day, row: Row, work: Work, here: str) -> Iterator[Leg]:
             if last is not None:
                 way, what = np.vstack([last, ends[:1]]), "drive" if position else "back"
                 yield _driven(day, what, way, row.ahead, here, start, speed if position else None)
-            name = ground_name(number, side % len(visit.ground[number]))
+            name = ground_name(visit.kind, number, side % len(visit.ground[number]))
             yield Leg("pass", day.moves[name].report.duration, ends, row.ahead, (name,), start, goal, each.plot)
             last, here, side = ends[1:], goal, (side + crossing.lines) % 2
 
@@ -127,7 +130,7 @@ def held(boom: Boom, task: ScanTask, moves: dict[str, Move], leg: Leg) -> Array:
 
 
 def starting_ratio(boom: Boom, day: Day, found: tuple[Leg, ...]) -> float:
-    """Return the largest demand over limit of a drive that holds while the vehicle starts, stops or turns.
+    """Return the largest demand over limit of a drive while the vehicle starts, stops or turns.
 
     The mount accelerates by STARTS ahead, back or to either side, at every position from which the
     vehicle drives.
@@ -201,7 +204,7 @@ def _blocks(scan: "Scan") -> list[tuple[str, ...]]:
 
 
 def _sweep(scan: "Scan", targets: tuple[str, ...], hold: str) -> list[str]:
-    """Return the steps from the first target on: holding after the last, or, driving past, at each."""
+    """Return the steps from the first target on, with a hold after the last, or at each."""
     held = ["", "[[steps]]", f"hold_s = {hold}"]
     if scan.task.speed is None:
         return [line for target in targets[1:] for line in _step(scan, target, line=True)] + held
@@ -209,27 +212,27 @@ def _sweep(scan: "Scan", targets: tuple[str, ...], hold: str) -> list[str]:
 
 
 def _ground_steps(scan: "Scan") -> list[str]:
-    """Return the steps of lines over the ground: each move as samples, the way forward, and a hold."""
+    """Return the steps of lines over the ground: samples, the way forward, and a hold."""
     passed = [leg for leg in scan.legs if leg.what == "pass"]
-    visit = next(visit for visit in scan.visits if visit.ground)
+    kinds = {visit.kind: visit for visit in scan.visits if visit.ground}
+    sweeps = [(kind, number, sides) for kind, visit in kinds.items() for number, sides in enumerate(visit.ground)]
     forward = {
-        ground_name(n, k): " to ".join(each.crossing.forward)
-        for n, sides in enumerate(visit.ground)
-        for k, each in enumerate(sides)
+        ground_name(kind, number, k): each.crossing.forward for kind, number, sides in sweeps for k, each in enumerate(sides)
     }
-    moved = sum(scan.moves[name].report.duration for leg in passed for name in (leg.moves[0], forward[leg.moves[0]]))
+    done = [(leg.moves[0], " to ".join(forward[leg.moves[0]])) for leg in passed]
+    moved = sum(scan.moves[name].report.duration for names in done for name in names)
     hold = f"{max((scan.duration - moved) / max(len(passed), 1), _SHORTEST):.4f}"
     lines: list[str] = []
-    for number, sides in enumerate(visit.ground):
-        names = [ground_name(number, side) for side in range(len(sides))]
+    for kind, number, sides in sweeps:
+        names = [ground_name(kind, number, side) for side in range(len(sides))]
         count = sum(leg.moves[0] in names for leg in passed)
         each = [
             [
                 *("", "[[steps]]", f"motion = {_samples(scan.moves[name])}"),
-                *_step(scan, side.crossing.forward[1], line=True),
+                *_step(scan, forward[name][1], line=True),
                 *("", "[[steps]]", f"hold_s = {hold}"),
             ]
-            for name, side in zip(names, sides, strict=True)
+            for name in names
         ]
         lines += ["", "[[steps]]", f'to = "{_joints(scan.moves[names[0]])}"', f'profile = "{scan.task.profile}"']
         if count >= len(names):

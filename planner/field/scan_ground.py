@@ -1,17 +1,18 @@
 """Lines of the tip across a plot that are straight over the ground while the vehicle drives past.
 
-The vehicle's travel is the parameter of the path: at the travel d, the tip is in the mount's frame at
+The vehicle's travel is the parameter of the path: at the travel d, the tip is in the mount's frame
+at
 
     p(d) = ground(d) - d x
 
-so the tip stays on its line over the ground whatever the speed of the vehicle. At a constant speed v
-the joints follow the path at d = v t: their speeds grow with v, accelerations with v^2, jerks with
-v^3. The largest speed is where the first of them, or a drive, is at its limit. A mount at constant
-speed is an inertial frame, so the loads are those of a mount at rest.
+so the tip stays on its line over the ground whatever the speed of the vehicle. At a constant speed
+v the joints follow the path at d = v t: their speeds grow with v, accelerations with v^2, jerks
+with v^3. The largest speed is where the first of them, or a drive, is at its limit. A mount at
+constant speed is an inertial frame, so the loads are those of a mount at rest.
 
-Over a plot the tip comes to rest over the ground, crosses the plot, steps on, crosses it back and so
-on, and comes to rest beside the vehicle again; then a line along the row takes it forward for the
-next plot.
+Over a plot the tip comes to rest over the ground, crosses the plot, steps on, crosses it back and
+so on, and comes to rest beside the vehicle again. Then a line along the row takes it forward for
+the next plot.
 """
 
 from collections.abc import Iterator
@@ -35,6 +36,8 @@ from planner.timing.time_law import Motion, TimeLaw
 DOWN = -np.pi / 2.0
 _SHARES = (0.6, 0.75, 0.9)
 """Tried: share of the travel from plot to plot in which the tip is over the ground."""
+_LONGEST, _LEAST = 1.5, 1.0
+"""That travel counts up to 1.5 times what the lines span, or 1 m."""
 _WEIGHTS = (1.0, 1.6)
 """Tried: travel of a crossing over that of a step."""
 _FEW_LOOKS, _LOOKS = 201, 1001
@@ -137,7 +140,7 @@ class Crossing:
 
     @property
     def forward(self) -> tuple[str, str]:
-        """The targets of the tip where it has fallen back, and where it sets out for the next plot."""
+        """The targets of the tip at the end of a plot, and where it sets out for the next one."""
         return _target(-0.5 * self.back, self.end_y, self.height), _target(0.5 * self.back, self.end_y, self.height)
 
     def pieces(self) -> tuple[GroundPiece, ...]:
@@ -173,7 +176,7 @@ class GroundLines:
 def fastest_crossing(
     boom: Boom, y: tuple[float, float], lines: int, spacing: float, period: float, height: float, constraint: str, profile: str
 ) -> tuple[float, Crossing] | None:
-    """Return the crossing that allows the largest speed of the vehicle, of those tried, and about that speed [m/s].
+    """Return the crossing with the largest speed of the vehicle, and about that speed [m/s].
 
     None is returned where none is within reach. The speed is that of the first, a middle and the
     last pieces; `ground_lines` gives that of all.
@@ -189,10 +192,11 @@ def fastest_crossing(
         profile: of the move forward; jerk limits hold everywhere with "jerk-limited".
     """
     rule = parse_constraint(constraint)
+    longest = min(period, max(_LONGEST * lines * spacing, _LEAST))
     tried: list[tuple[float, Crossing]] = []
     for share in _SHARES:
         for weight in _WEIGHTS:
-            step = share * period / (lines * (1.0 + weight))
+            step = share * longest / (lines * (1.0 + weight))
             crossing = Crossing(y, lines, spacing, period, height, weight * step, step)
             pieces = crossing.pieces()
             some = (*pieces[:3], pieces[2 * (lines // 2) - 1], pieces[-2])
@@ -242,7 +246,7 @@ def _speed(boom: Boom, piece: GroundPiece, rule: Constraint, profile: str) -> fl
 
 
 def _between(boom: Boom, crossing: Crossing, constraint: str, profile: str) -> float:
-    """Return the speed at which the vehicle is at the next plot when the tip has come forward [m/s]."""
+    """Return the speed [m/s] at which the tip has come forward at the next plot."""
     forward = plan_motion(boom, MoveSpec.of(*crossing.forward, along="line", profile=profile, constraint=constraint))
     return (crossing.period - crossing.travel) / forward.duration
 

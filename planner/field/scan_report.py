@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from planner.checks.rows import Verdict
 from planner.field.scan import Scan
 from planner.field.scan_day import STARTS
 from planner.reports.markdown import section, table
@@ -24,6 +25,12 @@ def headline(scan: Scan) -> str:
 
 def _passes(scan: Scan) -> str:
     return f"{scan.passes} pass{'es' if scan.passes > 1 else ''} a row"
+
+
+def seen_line(scan: Scan) -> str:
+    """Return how much of the plots is seen."""
+    low, high = f"{scan.coverage.min():.1%}", f"{scan.coverage.max():.1%}"
+    return f"{low if low == high else f'{low} to {high}'} of each plot seen, each spot {scan.overlap.mean():.1f} times"
 
 
 def day_seconds(scan: Scan) -> dict[str, float]:
@@ -75,11 +82,11 @@ def scan_columns(scan: Scan) -> dict[str, list[Any]]:
 
 def scan_report(scan: Scan, failed: str = "") -> str:
     """Return the report in Markdown; its first paragraph is the verdict."""
-    low, high = scan.coverage.min(), scan.coverage.max()
-    seen = f"{low:.1%} to {high:.1%} of each plot seen"
-    verdict = f"FAIL: {failed}" if failed else f"INCOMPLETE: nothing fails, some drives have no data; {seen}"
-    lines = ["# Row scan", "", verdict, "", f"{headline(scan)}. {day_line(scan)}."]
-    lines += [line for text in pass_lines(scan) for line in ("", f"{text[0].upper()}{text[1:]}.")]
+    open_ = any(move.report.verdict is Verdict.INCOMPLETE for move in scan.moves.values())
+    fine = "INCOMPLETE: nothing fails, some drives have no data" if open_ else "PASS: nothing fails"
+    verdict = f"FAIL: {failed}" if failed else f"{fine}; {seen_line(scan)}"
+    said = [headline(scan), day_line(scan), *pass_lines(scan)]
+    lines = ["# Row scan", "", verdict, *(line for text in said for line in ("", f"{text[0].upper()}{text[1:]}."))]
     lines += ["", "## Plots", ""]
     columns = scan_columns(scan)
     header = ("plot", "seen", "times", "time", "work of joints", "reason")

@@ -1,4 +1,4 @@
-"""Rows of plots as a vehicle drives along them: to and fro, with the plots on its left, and its turns between rows."""
+"""Rows of plots as a vehicle drives along them, plots on its left, and its turns between rows."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ _POINTS = 24  # of an arc
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """A plot as its track sees it: x along the track from the middle of the plot, y to the left [m]."""
+    """A plot beside its track: x along the track from its middle, y to the left of the row [m]."""
 
     plot: int
     row: int
@@ -47,13 +47,17 @@ class Row:
         return min(p.along + p.x[0] for p in self.plots), max(p.along + p.x[1] for p in self.plots)
 
     @property
+    def width(self) -> tuple[float, float]:
+        """From the right edge of the plots to the left one, from the row's middle line [m]."""
+        return min(plot.y[0] for plot in self.plots), max(plot.y[1] for plot in self.plots)
+
+    @property
     def period(self) -> float:
-        """Least way from one plot to the next; of a single plot, its own length."""
-        along = [plot.along for plot in self.plots]
-        return min(np.diff(along), default=self.plots[0].x[1] - self.plots[0].x[0])
+        """Least way from one plot to the next; infinite for a single plot."""
+        return float(min(np.diff([plot.along for plot in self.plots]), default=np.inf))
 
     def at(self, along: float, offset: float) -> Array:
-        """Return the mount's place (2,) at a way along the row, `offset` to the right of its middle."""
+        """Return the mount's place (2,) along the row, `offset` to the right of its middle."""
         place: Array = self.middle + along * self.ahead - offset * self.left
         return place
 
@@ -90,7 +94,7 @@ def rows_of(plots: PlotMap) -> tuple[Row, ...]:
 
 
 def _axis(plots: PlotMap, middles: Array, rows: Array, ranges: Array) -> Array:
-    """Return the unit vector along the rows: from plot to plot, or along the first plot's longer side."""
+    """Return the unit vector along the rows: from plot to plot, or along a plot's longer side."""
     for row in np.unique(rows):
         mine = np.flatnonzero(rows == row)
         if len(mine) > 1:
@@ -103,7 +107,7 @@ def _axis(plots: PlotMap, middles: Array, rows: Array, ranges: Array) -> Array:
 
 
 def turn(start: Array, ahead: Array, goal: Array, radius: float) -> Array:
-    """Return the shortest way (n, 2) from a row's end to the next row, driven in the opposite direction.
+    """Return the way (n, 2) from a row's end to the next row, driven in the opposite direction.
 
     Arcs of one radius: a half circle with a straight part where the rows are two radii apart or
     more. Else the vehicle first swings away by the angle b, cos b = (w + 2 R) / (4 R), turns by

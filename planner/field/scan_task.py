@@ -1,4 +1,4 @@
-"""What a row scan is to do, and what of it is planned: visits of plots, legs of the vehicle's day."""
+"""What a row scan is to do, and what is planned: visits of plots, legs of the day."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -48,6 +48,8 @@ class Visit:
     """How far the tip goes to either side of the mount [m]."""
     reason: str
     """Why a line cannot be reached; empty where all can."""
+    kind: int = 0
+    """Number of its kind: plots of one kind have the same moves."""
     ground: tuple[tuple[GroundLines, ...], ...] = ()
     """Of each pass, lines across the plot that stand still over the ground: from the near edge, and
     from the far edge if they end there. With them, `lines` are not driven."""
@@ -102,7 +104,7 @@ class Leg:
 
 
 def targets_of(visit: Visit, task: ScanTask) -> tuple[str, ...]:
-    """Return the targets of the tip over one stop, to and fro from line to line; or in every pass."""
+    """Return the targets of the tip over one stop, to and fro, or in every pass."""
     targets = []
     for number, y in enumerate(visit.lines):
         half = visit.half
@@ -111,9 +113,16 @@ def targets_of(visit: Visit, task: ScanTask) -> tuple[str, ...]:
     return tuple(targets)
 
 
-def ground_name(number: int, side: int) -> str:
-    """Return the words of a move over the ground, of a pass from 0 on, from the near (0) or the far (1) edge."""
-    return f"lines across, pass {number + 1}, from the {'far' if side else 'near'} edge"
+def ground_name(kind: int, number: int, side: int) -> str:
+    """Return the words of a move over the ground.
+
+    Args:
+        kind: of the plot.
+        number: of the pass, from 0 on.
+        side: where it begins: 0 at the near edge, 1 at the far one.
+    """
+    plots = f", plots of kind {kind + 1}" if kind else ""
+    return f"lines across, pass {number + 1}, from the {'far' if side else 'near'} edge{plots}"
 
 
 def first_line(plot: Beside, lines: int, task: ScanTask) -> float:

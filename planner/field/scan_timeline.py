@@ -1,4 +1,4 @@
-"""A scan in time: where the mount and the joints are, and what the sensor sees, in the plane of the map."""
+"""A scan in time: mount, joints, and what the sensor sees, in the plane of the map."""
 
 from dataclasses import dataclass
 
@@ -33,7 +33,7 @@ class Timeline:
         return self._placed(forward_kinematics(boom, self.q).position)
 
     def footprints(self, boom: Boom, size: tuple[float, float]) -> Array:
-        """Return the corners (n, 4, 2) of the sensor's footprint, along the arm and across it [m]."""
+        """Return the corners (n, 4, 2) [m] of the footprint of a size along the arm, across it."""
         tip = forward_kinematics(boom, self.q).position
         signs = 0.5 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * size
         c, s = np.cos(self.q[:, 0]), np.sin(self.q[:, 0])
@@ -68,7 +68,7 @@ def timeline(boom: Boom, scan: Scan, step: float) -> Timeline:
 
 
 def _joints(boom: Boom, scan: Scan, leg: Leg, t: Array) -> Array:
-    """Return joint positions (n, 5) at times from a leg's begin; the boom holds still after its moves."""
+    """Return joint positions (n, 5) at times from a leg's begin; after its moves the boom holds."""
     if not leg.moves:
         return np.tile(held(boom, scan.task, scan.moves, leg), (len(t), 1))
     q = np.empty((len(t), 5))
@@ -92,7 +92,7 @@ class Seen:
 
 
 def seen_so_far(boom: Boom, scan: Scan, every: float, spacing: float = 0.05) -> Seen:
-    """Return how much of each plot was seen so far, counted on a grid of points, one image after the other.
+    """Return how much of each plot was seen so far, counted on a grid of points.
 
     Args:
         boom: the boom of the scan.

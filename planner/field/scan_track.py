@@ -1,4 +1,4 @@
-"""A row scan along a vehicle's log: the tip stays on its line over the ground while the vehicle weaves, rolls and pitches.
+"""A row scan along a log: the tip stays on its line over the ground while the vehicle weaves.
 
 The mount's motion is a quintic spline fitted to the log, a knot a second: the boom follows what is
 slower than that. At every time, the tip is in the mount's frame at
@@ -68,7 +68,7 @@ class MountMotion:
         return values[..., :3], attitude.rotation(values[..., 3], values[..., 4], values[..., 5])
 
     def base(self, t: Array) -> BaseMotion:
-        """Return the motion of the boom's base at times t (n,); the turn's rates by central differences."""
+        """Return the motion of the base at times t (n,); turn rates by central differences."""
         h = 1e-3
         _, R = self.pose(t)
         rate = _rates(self.pose(t - h)[1], R, self.pose(t + h)[1], h)
@@ -210,7 +210,7 @@ def scan_along(boom: Boom, plots: PlotMap, task: ScanTask, log: VehicleLog, rig:
 
 
 def _mount_of(log: VehicleLog, plots: PlotMap, rig: Rig | None) -> tuple[Array, Array]:
-    """Return the mount's places (n, 3) in the map's frame and its roll, pitch, heading (n, 3), without jumps of a turn."""
+    """Return the mount's places (n, 3) in the map's frame and its roll, pitch, heading (n, 3)."""
     R_ecef_body = log.R_ecef_body if rig is None else log.R_ecef_body @ rig.R_body_imu.T
     lever = np.zeros(3) if rig is None else rig.mount - rig.antenna
     R_body_mount = np.eye(3) if rig is None else rig.R_body_mount
@@ -220,7 +220,7 @@ def _mount_of(log: VehicleLog, plots: PlotMap, rig: Rig | None) -> tuple[Array, 
 
 
 def _ways(rows: tuple[Row, ...], place: Array, log: VehicleLog) -> list[tuple[Row, int, int]]:
-    """Return for each way past a row, with it on the left, the first and the last fix, in the order of time."""
+    """Return the first and the last fix of each way past a row on the left, in order of time."""
     times = [np.clip(log.t + dt, log.t[0], log.t[-1]) for dt in (-_SMOOTH, _SMOOTH)]
     ends = [np.stack([np.interp(t, log.t, column) for column in place[:, :2].T], axis=-1) for t in times]
     velocity = (ends[1] - ends[0]) / (times[1] - times[0])[:, None]
@@ -280,7 +280,7 @@ def _pass(boom: Boom, task: ScanTask, row: Row, line: float, mount: MountMotion)
 
 
 def _prints(boom: Boom, task: ScanTask, each: Pass) -> Array:
-    """Return the corners (n, 4, 2) of what the sensor sees in a pass, in the plane of the map [m]."""
+    """Return the corners (n, 4, 2) [m] of what the sensor sees in a pass, in the map's plane."""
     if each.trajectory is None:
         return np.empty((0, 4, 2))
     t = np.arange(0.0, each.trajectory.duration, 1.0 / task.rate)

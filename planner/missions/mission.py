@@ -382,7 +382,7 @@ def _leg(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -
 
 
 def _recorded(samples: list[list[float]], q: Array) -> tuple[Leg, Array, tuple[str, ...]]:
-    """Return the leg of samples, with velocities and accelerations of a cubic spline at rest at both ends."""
+    """Return the leg of samples, by a cubic spline at rest at both ends."""
     table = checked("motion", samples)
     apart = float(np.abs(table[0, 1:] - q).max())
     if apart > _SAME_POSITION:

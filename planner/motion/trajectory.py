@@ -135,7 +135,7 @@ def concatenate(parts: Sequence[Trajectory], notes: tuple[str, ...] = ()) -> Tra
 
 
 def through_rest(t: Array, q: Array) -> Trajectory:
-    """Return the motion of a cubic spline through samples, at rest at both ends, at the samples' times.
+    """Return the motion of a cubic spline through samples, at rest at both ends.
 
     Args:
         t: (n,) times from 0 on [s].

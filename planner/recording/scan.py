@@ -1,4 +1,4 @@
-"""Recording of a row scan: the vehicle drives through the field, the boom works, and a map shows what was seen."""
+"""Recording of a row scan: the vehicle drives, the boom works, a map shows what was seen."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from planner.field.earth import geodetic_of
 from planner.field.extra import library
 from planner.field.plots import PlotMap
 from planner.field.scan import Scan
-from planner.field.scan_report import assumptions, day_line, headline, pass_lines, scan_report
+from planner.field.scan_report import assumptions, day_line, headline, pass_lines, scan_report, seen_line
 from planner.field.scan_timeline import Timeline, seen_so_far, timeline
 from planner.recording.layout import eye_on, scene, shown_beside, text
 from planner.recording.legend import legend_view, log_legend
@@ -32,7 +32,7 @@ _SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def write_scan_recording(path: str | Path, boom: Boom, scan: Scan) -> None:
-    """Write the day of a scan in east, north, up [m], and a map whose plots and track need no network.
+    """Write the day of a scan in east, north, up [m], and a map that needs no network.
 
     /answer, /report             what was asked and found
     /world/mount, /world/boom    the vehicle and the boom
@@ -68,7 +68,10 @@ def write_scan_recording(path: str | Path, boom: Boom, scan: Scan) -> None:
 
 
 def _blueprint(line: Timeline) -> rrb.Blueprint:
-    """Return the layout; the map asks a server for its background, so it is shown only when its tab is opened."""
+    """Return the layout.
+
+    The map asks a server for its background, so it is shown only when its tab is opened.
+    """
     around = np.column_stack([line.mount, np.zeros(len(line.t))])
     view = scene("Field: east, north, up [m]", eye_on(around, 0.8, away=0.75))
     middle, size = (around.min(axis=0) + around.max(axis=0)) / 2.0, float(np.ptp(around, axis=0).max())
@@ -81,12 +84,11 @@ def _blueprint(line: Timeline) -> rrb.Blueprint:
 
 
 def _answer(scan: Scan) -> str:
-    low, high = scan.coverage.min(), scan.coverage.max()
     lost = [f"{name}: {why}" for name, why in scan.unreachable.items()]
     frame = scan.plots.frame
     place = f"{np.degrees(frame.latitude):.7f}, {np.degrees(frame.longitude):.7f} deg"
     lines = [
-        f"**{low:.1%} to {high:.1%} of each plot seen**, each spot {scan.overlap.mean():.1f} times.",
+        f"**{seen_line(scan)}.**",
         f"{headline(scan)}.",
         f"{day_line(scan)}.",
         *pass_lines(scan),

@@ -1,4 +1,4 @@
-"""A simulated field: the exported MJCF in MuJoCo on a vehicle that drives and rolls, against the geotags of its logs."""
+"""A simulated field: the exported MJCF in MuJoCo on a driving vehicle, against geotags."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -43,7 +43,7 @@ class Simulated(NamedTuple):
 
 @pytest.fixture(scope="module")
 def field() -> Simulated:
-    """Every millisecond of the joints and of the two points, from MuJoCo; servos with gravity feed-forward move the boom."""
+    """Every millisecond of joints and points, from MuJoCo; servos with feed-forward move the boom."""
     boom, drive = without_drives(Boom.load()), Drive()
     model, data = _model(boom)
     steps = int(SECONDS / STEP)
@@ -84,7 +84,7 @@ def _site(body, name, place):
 
 
 def _tags(field: Simulated, noisy: bool, late: float = 0.0):
-    """Geotags of the sensor from the logs of the simulated antenna, inertial sensor and encoders, and what is true."""
+    """Geotags from the logs of the simulated instruments, and how far they are from the truth."""
     random = np.random.default_rng(5)
     scale = 1.0 if noisy else 0.0
     fixes, joints = np.arange(0, len(field.t), FIX), np.arange(0, len(field.t), SAMPLE)
@@ -104,7 +104,7 @@ def _tags(field: Simulated, noisy: bool, late: float = 0.0):
 
 
 def _rig():
-    """The rig of the tests without what only it adds: no turn of the inertial sensor, no latencies, no errors of its own."""
+    """The rig of the tests without latencies, a turn of the inertial sensor, errors of its own."""
     with TemporaryDirectory() as folder:
         place = Path(folder) / "rig.toml"
         place.write_text(RIG)
@@ -115,7 +115,7 @@ def _rig():
 
 
 def test_the_simulated_boom_moves(field):
-    """It sweeps, lags its servos, and its loop stays closed: the encoders alone say where the tip is."""
+    """It sweeps and lags its servos: the encoders alone say where the tip is."""
     assert np.ptp(field.q[BEGIN:], axis=0)[:4].min() > 0.05
     lag = np.abs(field.q - joint_position(field.t))[BEGIN:]
     assert 1e-4 < lag.max() < 0.05

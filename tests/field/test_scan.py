@@ -83,7 +83,7 @@ def test_its_mission_is_the_moves_in_order(stopped, tmp_path):
 
 
 def test_driving_past_at_half_a_metre_a_second():
-    scan = plan_scan(Boom.load(), trial()[0], ScanTask((0.5, 0.5), speed=0.5))
+    scan = plan_scan(Boom.load(), trial()[0], ScanTask((0.5, 0.5), speed=0.5, profile="cubic"))
     assert scan.coverage.min() >= 0.99
     assert scan.seconds == pytest.approx(np.full(40, 3 * 3.6 / 0.5), rel=1e-6)
     assert all(len(visit.lines) == 3 for visit in scan.visits)
@@ -92,7 +92,7 @@ def test_driving_past_at_half_a_metre_a_second():
 
 
 def test_what_cannot_be_reached_is_named():
-    far = plan_scan(Boom.load(), trial()[0], ScanTask((0.5, 0.5), offset=2.2, speed=0.5))
+    far = plan_scan(Boom.load(), trial()[0], ScanTask((0.5, 0.5), offset=2.2, speed=0.5, profile="cubic"))
     assert len(far.unreachable) == 40
     assert "the tip reaches no line at 2.55 m beside the mount" in next(iter(far.unreachable.values()))
     assert 0.5 < far.coverage.max() < 0.9

@@ -1,4 +1,4 @@
-"""Lines over the ground while the vehicle drives: seen from the ground, from the planned joints and the track alone."""
+"""Lines over the ground while the vehicle drives, from the planned joints and the track alone."""
 
 from dataclasses import replace
 
@@ -51,7 +51,7 @@ def twice() -> Scan:
 
 
 def test_lines_are_straight_over_the_ground(lines):
-    """The mount drives at a constant speed; where the tip moves across, it stays on one line of the ground."""
+    """The mount drives evenly; where the tip moves across, it stays on one line of the ground."""
     move = ground_move(BOOM, lines, SPEED)
     motion = move.trajectory
     tip = forward_kinematics(BOOM, motion.q)
@@ -98,6 +98,20 @@ def test_one_pass_covers_the_plots(small):
     assert seen.share[-1].min() >= 0.985  # on points 5 cm apart
 
 
+@pytest.fixture(scope="module")
+def gap() -> Scan:
+    """A row without its second plot: the vehicle goes on to the third one."""
+    whole = small_map()
+    names, rings = list(whole.names)[:3], [list(each) for each in whole.rings][:3]
+    few = PlotMap.of(names, rings, rows=list(whole.rows)[:3], ranges=list(whole.ranges)[:3], height=480.0)
+    return plan_scan(BOOM, few, ScanTask((0.5, 0.5), speed=SPEED, profile="cubic"))
+
+
+def test_a_gap_in_a_row_is_no_hindrance(gap):
+    assert gap.passes == 1
+    assert gap.coverage.min() >= 0.99
+
+
 def test_two_passes_with_an_odd_number_of_lines(twice):
     assert twice.passes == 2
     assert twice.visits[0].ground[0][0].crossing.lines == 5
@@ -109,9 +123,9 @@ def test_two_passes_with_an_odd_number_of_lines(twice):
     }
 
 
-@pytest.mark.parametrize("which", ["small", "twice"])
+@pytest.mark.parametrize("which", ["small", "twice", "gap"])
 def test_the_day_is_continuous(which, request):
-    """Mount and joints have no jump from one leg to the next, and the vehicle is no faster than it drives."""
+    """Mount and joints do not jump from leg to leg, and the vehicle is no faster than it drives."""
     step, small = 0.1, request.getfixturevalue(which)
     line = timeline(BOOM, small, step)
     assert np.linalg.norm(np.diff(line.mount, axis=0), axis=1).max() <= 1.0 * step + 1e-6
@@ -151,7 +165,7 @@ def test_keep_out_shapes_stop_lines_over_the_ground():
 
 
 def test_starts_and_stops_load_the_drives_more_than_standing(small):
-    """The worst of four directions of 1 m/s^2 at the held positions, by gravity tilted as d'Alembert says."""
+    """The worst of four directions of 1 m/s^2, by gravity tilted as d'Alembert says."""
     starts = {leg.start: leg for leg in small.legs}
     worst = 0.0
     for leg in starts.values():
@@ -169,7 +183,7 @@ def test_starts_and_stops_load_the_drives_more_than_standing(small):
 @pytest.mark.parametrize("apart", [0.0, 1.5, 5.1, 8.0, 11.0, -5.1])
 @pytest.mark.parametrize("beyond", [0.0, 2.0, -2.0])
 def test_turns_are_arcs_from_row_to_row(apart, beyond):
-    """The heading turns by 180 deg, no tighter than the radius, and the length is the closed form's."""
+    """The heading turns by 180 deg, no tighter than the radius; the length is the closed form's."""
     ahead = np.array([0.6, 0.8])
     goal = np.array([3.0, 4.0]) + beyond * ahead + apart * np.array([-0.8, 0.6])
     way = turn(np.array([3.0, 4.0]), ahead, goal, 4.0)

@@ -1,4 +1,4 @@
-"""Scans along a log: the tip's way over the ground from the planned joints and the true motion of the mount."""
+"""Scans along a log: the tip's way from the planned joints and the true motion of the mount."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_the_row_is_covered_and_the_others_are_not(weave, along):
 
 
 def test_limits_count_the_motion_of_the_mount(along):
-    """The torque ratio of the report is that with the base's motion, and another than that of a mount at rest."""
+    """Torques are those with the base's motion, and others than those of a mount at rest."""
     each = along.passes[1]
     motion = each.trajectory
     still = inverse_dynamics(BOOM, motion.q, motion.qd, motion.qdd, friction=True, reactions=False).tau
@@ -89,7 +89,7 @@ def test_a_rig_takes_the_antenna_to_the_mount(weave, tmp_path):
 
 
 def test_rtk_noise_leaves_the_tip_within_a_centimetre(weave):
-    """White noise of 14 mm at 20 Hz, smoothed over a second: some 14 mm * sqrt(1 / 20) beside the line."""
+    """White noise of 14 mm at 20 Hz, smoothed over a second: some 14 mm * sqrt(1 / 20)."""
     found = scan_along(BOOM, weave.plots, TASK, weave.log(0.0143))
     each = found.passes[0]
     place, R = weave.pose(each.curve.mount.begin + each.trajectory.t)

@@ -12,7 +12,7 @@ SPEED, BACK, BEYOND, OFFSET = 0.5, 1.0, 1.5, 1.9
 
 
 class Weave:
-    """A vehicle that passes the first row three times, weaving by 5 cm and rolling, and drives back in between."""
+    """A vehicle that passes the first row three times, weaving by 5 cm, and drives back."""
 
     def __init__(self, passes=3):
         self.plots = trial()[0]
