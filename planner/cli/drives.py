@@ -216,7 +216,7 @@ def size(
     """
     from boom_model import JOINTS, Catalogue
     from planner.missions.mission import check_steady, load_mission
-    from planner.sizing.choice import Adapt, choose, parse_variant, too_high
+    from planner.sizing.choice import Adapt, choose, parse_variant, too_high, untried
     from planner.sizing.tables import sizing_json, sizing_notes
 
     boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
@@ -227,14 +227,15 @@ def size(
     check_steady(case)
     work = _work(boom, asked, how, case)
     choices = choose(booms, work, joints or JOINTS, catalogue, voltages, how, payload_as, tracked("checking drives"), case)
-    notes = sizing_notes(choices, how, case, too_high(catalogue, voltages))
+    left_out = untried(catalogue)
+    notes = sizing_notes(choices, how, case, (*too_high(catalogue, voltages), *left_out))
     written = with_names({"report": document})
     _write_sizing(files, boom, asked, choices, notes, document)
     if as_json:
         print_json(sizing_json(asked.name, choices, notes) | {"files": written})
     else:
         print_lines(None, [f"mission {asked.name}, payload {boom.payload.mass:g} kg"])
-        _print_choices(choices, notes, whole)
+        _print_choices(choices, notes, whole, left_out)
         print_files(written)
         print_lines("next", [] if whole else [f"boom size {mission} --report drives.pdf"])
     unmet = [f"{choice.joint}, {choice.variant}" for choice in choices if choice.unmet]
@@ -276,7 +277,7 @@ def _write_sizing(
         write_document(files.temporary(document), text, sizing_pictures(choices))
 
 
-def _print_choices(choices: Sequence["Choice"], notes: Sequence[str], whole: bool) -> None:
+def _print_choices(choices: Sequence["Choice"], notes: Sequence[str], whole: bool, left_out: Sequence[str]) -> None:
     """Print the conclusion and the best drive per joint, and with `whole` every drive and note."""
     from planner.sizing.tables import (
         SAVING,
@@ -293,6 +294,7 @@ def _print_choices(choices: Sequence["Choice"], notes: Sequence[str], whole: boo
     print_rows(*answer_rows(choices), drop=("fitted", "mass"))
     if not whole:
         print_lines("not checked", (f"{joints}: {reason}" for joints, reason in not_checked(choices)))
+        print_lines("not tried", left_out)
         print_lines(None, [f"{len(notes)} notes, every drive ranked: --all lists them"])
         return
     print_rows(SAVING, saving(choices))

@@ -8,7 +8,7 @@ import numpy as np
 
 from boom_model import Drive, LinearDrive
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_limit, reflected_inertia
-from planner.checks.drives.gearbox import L50_OVER_L10
+from planner.checks.drives.gearbox import rated_L10
 from planner.sizing.requirement import Requirement
 
 
@@ -59,14 +59,34 @@ def _drive(need: Requirement, drive: Drive) -> Iterator[Shortfall]:
         ("gearbox stiffness ranges", None if gear.torsion_torques is None else gear.torsion_torques[0]),
         ("gearbox backlash", gear.backlash),
         ("gearbox hysteresis", gear.hysteresis),
-        ("motor running torque", motor.running_torque),
     ):
         yield from _judged(item, None, figure)
-    held = None if motor.holding_torque is None else gear.ratio * motor.holding_torque
-    yield from _judged("motor holding torque at the joint", need.hold.torque * (1.0 + STEPPER_MARGIN), held)
+    if motor.is_servo:
+        yield from _servo(need, drive, inertia)
+    else:
+        yield from _judged("motor running torque", None, motor.running_torque)
+        held = None if motor.holding_torque is None else gear.ratio * motor.holding_torque
+        yield from _judged("motor holding torque at the joint", need.hold.torque * (1.0 + STEPPER_MARGIN), held)
     yield from _judged("reflected inertia", need.largest_reflected, inertia, le)
     if inertia is not None:
         yield from _curve(need, drive, inertia)
+
+
+def _servo(need: Requirement, drive: Drive, inertia: float | None) -> Iterator[Shortfall]:
+    """Yield what a servo motor lacks besides its peak torque.
+
+    Its RMS torque is at most rms(tau) / (N eta) + T_noload + J max |qdd| / N, by the triangle
+    inequality.
+    """
+    motor, gear = drive.motor, drive.gearbox
+    held = None if motor.rated_torque is None else gear.ratio * motor.rated_torque
+    yield from _judged("motor continuous torque at the joint", need.hold.torque, held)
+    yield from _judged("motor rated speed", gear.ratio * need.top_speed, motor.rated_speed)
+    if inertia is None or gear.efficiency is None or gear.no_load_input_torque is None:
+        return  # the torque-speed table says so
+    fastest = max(step.acceleration for step in need.steps)
+    rms = need.rms / (gear.ratio * gear.efficiency) + gear.no_load_input_torque + inertia * fastest / gear.ratio
+    yield from _judged("motor continuous torque", rms, motor.rated_torque)
 
 
 def _curve(need: Requirement, drive: Drive, inertia: float) -> Iterator[Shortfall]:
@@ -75,7 +95,8 @@ def _curve(need: Requirement, drive: Drive, inertia: float) -> Iterator[Shortfal
     The torque falls with speed, so what it gives at the end of a row it gives within the row.
     """
     if available_torque(drive, 0.0) is None:
-        yield Shortfall("bus voltage and wiring, for torque at speed", None, None)
+        missing = "motor torques and rated speed" if drive.motor.is_servo else "bus voltage and wiring, for torque at speed"
+        yield Shortfall(missing, None, None)
         return
     given = motor_limit(drive, np.array([step.speed for step in need.steps]))
     if given is None:
@@ -92,11 +113,12 @@ def _life(need: Requirement, drive: Drive) -> Iterator[Shortfall]:
     gear = drive.gearbox
     if not need.mean:
         return
-    if gear.rated_life is None or gear.rated_input_speed is None or gear.continuous_torque is None:
+    rated = rated_L10(gear)
+    if rated is None or gear.rated_input_speed is None or gear.continuous_torque is None:
         yield Shortfall("gearbox life", need.life_s, None)
         return
     speed = gear.ratio * need.mean_speed
-    life = gear.rated_life * (gear.rated_input_speed / speed) * (gear.continuous_torque / need.mean) ** 3 / L50_OVER_L10
+    life = rated * (gear.rated_input_speed / speed) * (gear.continuous_torque / need.mean) ** 3
     yield from _judged("gearbox life", need.life_s, life)
 
 

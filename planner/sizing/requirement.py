@@ -12,7 +12,7 @@ from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.words import unknown
 from planner.checks.drives.gearbox import LEAST_FREQUENCY
 from planner.checks.drives.joint_view import JointView
-from planner.checks.drives.motor import INERTIA_RATIO
+from planner.checks.drives.servo import INERTIA_RATIO
 from planner.checks.evaluation import Evaluation, at_samples
 from planner.checks.motion_checks import joint_views
 from planner.missions.mission import Cycle, check_steady

@@ -214,7 +214,7 @@ def sizing_notes(
     unknown = ", ".join(unknown_checks(choices))
     notes = [
         f"a margin is (limit - demand) / demand; motor torque needs a margin of {STEPPER_MARGIN:.0%}",
-        "drives are ranked by mass, then by the smallest margin beyond the required one",
+        "drives are ranked by the number of limits without data, then by mass, then by the smallest margin",
         "the power-off check is left out, because it depends on the brake; see the report of the mission",
         _ADAPT_NOTES[adapt],
         _LEVEL_GROUND if vehicle is LEVEL else vehicle.sentence,
