@@ -11,7 +11,7 @@ from boom_model.provenance import Origin, Sourced
 
 
 class Wiring(StrEnum):
-    """Connection of the phases of a stepper motor: of the two halves of each, or of the only winding."""
+    """Connection of a stepper motor's phases: of the two halves of each, or of the only winding."""
 
     PARALLEL = "parallel"
     SERIES = "series"
@@ -40,7 +40,7 @@ class Winding:
 
 @dataclass(frozen=True)
 class Motor:
-    """Hybrid stepper motor, or servo motor. None stands for a value that the datasheet does not print."""
+    """Hybrid stepper motor or servo motor. None is a value that the datasheet does not print."""
 
     name: str
     source: str
@@ -83,7 +83,7 @@ class Motor:
 
     @property
     def torque_margin(self) -> float:
-        """Required (available - required) / required torque: STEPPER_MARGIN, or 0 for a servo motor.
+        """Required (available - required) / required torque; STEPPER_MARGIN, or 0 for a servo.
 
         A servo motor does not lose steps when its torque is short for a moment.
         """

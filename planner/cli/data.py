@@ -74,7 +74,7 @@ def catalogue(boom_file: str | None, whole: bool, as_json: bool) -> int:
         return 0
     for header, rows in (
         (("motor", "kind", "holding, rated", "running, peak", "mass"), _rows(known.motors, _motor_figures)),
-        (("gearbox", "ratio", "average", "start, stop", "peak"), _rows(known.gearboxes, _gearbox_figures)),
+        (("gearbox", "ratio", "rated", "average", "start, stop", "peak"), _rows(known.gearboxes, _gearbox_figures)),
         (("actuator", "rated", "peak", "speed", "lead"), _rows(known.actuators, _actuator_figures)),
     ):
         shown = {name: [row] for name, row in rows.items()} if whole else _series(rows)
@@ -111,7 +111,7 @@ def _motor_figures(motor: Motor) -> _Row:
 
 
 def _gearbox_figures(gear: Gearbox) -> _Row:
-    torques = (gear.max_average_torque, gear.start_stop_torque, gear.peak_torque)
+    torques = (gear.continuous_torque, gear.max_average_torque, gear.start_stop_torque, gear.peak_torque)
     return (gear.ratio, ""), *((torque, "Nm") for torque in torques)
 
 

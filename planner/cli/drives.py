@@ -208,13 +208,14 @@ def size(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Check every drive of the catalogue on a mission; rank those without a FAIL by mass.
+    """Check the drives of the catalogue on a mission; rank those that do not fail.
 
     \b
     Example:
       boom size field-day --variant inner=5.55 --variant payload=5 --report drives.html
     """
     from boom_model import JOINTS, Catalogue
+    from boom_model.boom import IS_LENGTH
     from planner.missions.mission import check_steady, load_mission
     from planner.sizing.choice import Adapt, choose, parse_variant, too_high, untried
     from planner.sizing.tables import sizing_json, sizing_notes
@@ -227,7 +228,8 @@ def size(
     check_steady(case)
     work = _work(boom, asked, how, case)
     choices = choose(booms, work, joints or JOINTS, catalogue, voltages, how, payload_as, tracked("checking drives"), case)
-    left_out = untried(catalogue)
+    turned = any(not IS_LENGTH[JOINTS.index(joint)] for joint in joints or JOINTS)
+    left_out = untried(catalogue) if turned else ()
     notes = sizing_notes(choices, how, case, (*too_high(catalogue, voltages), *left_out))
     written = with_names({"report": document})
     _write_sizing(files, boom, asked, choices, notes, document)

@@ -40,6 +40,7 @@ LARGEST_STRETCH = 8.0
 """Largest factor by which `Adapt.RESCALE` slows the moves of a mission."""
 
 _STRETCH_STEPS = 16
+_NAMED = 3
 _GIVEN = Origin(Basis.ASSUMED, "candidate supply")
 
 
@@ -180,9 +181,8 @@ def size(
     """Check each drive on a joint, with the other joints' drives unchanged, and rank the results.
 
     Drives that do not fail come first: those with the fewest limits without data, then by mass,
-    then by margin. The mass of a drive is not added
-    to any body here. A different mass at the base does not change the torques of inner and lower; a
-    mass farther out would.
+    then by margin. The mass of a drive is not added to any body here. A different mass at the base
+    does not change the torques of inner and lower; a mass farther out would.
 
     Args:
         boom: the boom.
@@ -342,18 +342,20 @@ def _has_torque(motor: Motor) -> bool:
 
 
 def too_high(catalogue: Catalogue, voltages: Sequence[float]) -> tuple[str, ...]:
-    """Return a sentence for each voltage that some motor does not allow."""
-    limits = {name: motor.max_voltage for name, motor in catalogue.motors.items() if motor.max_voltage is not None}
+    """Return a sentence for each voltage that some stepper motor does not allow."""
+    steppers = [motor for motor in catalogue.motors.values() if not motor.is_servo]
+    limits = {motor.name: motor.max_voltage for motor in steppers if motor.max_voltage is not None}
     sentences = []
     for voltage in dict.fromkeys(voltages):
         weak = [name for name, limit in limits.items() if voltage > limit]
         if not weak:
             continue
         most = max(limits[name] for name in weak)
-        if len(weak) == len(catalogue.motors):
-            sentences.append(f"{voltage:g} V exceeds the limit of every motor (at most {most:g} V)")
+        if len(weak) == len(steppers):
+            sentences.append(f"{voltage:g} V exceeds the limit of every stepper motor (at most {most:g} V)")
         else:
-            sentences.append(f"{voltage:g} V exceeds the limit of {', '.join(weak)}; it is not tried there")
+            more = f" and {len(weak) - _NAMED} more" if len(weak) > _NAMED else ""
+            sentences.append(f"{voltage:g} V exceeds the limit of {', '.join(weak[:_NAMED])}{more}; it is not tried there")
     return tuple(sentences)
 
 
@@ -482,7 +484,7 @@ def spare(row: Row) -> float:
 
 
 def _rank(judged: Judged) -> tuple[bool, int, float, tuple[float, ...]]:
-    """Return the sorting key: failure, then the number of limits without data, then mass, then `spare`.
+    """Return the sorting key: failure, number of limits without data, mass, `spare`.
 
     Drives with the same gearbox share its rows, so the first different row decides between them.
     """

@@ -26,7 +26,7 @@ _NO_DRIVE_WORKS = (
     "replace it first in a boom file of your own"
 )
 
-SAVING = ("boom", "joint", "fitted", "lightest without a FAIL", "saved mass")
+SAVING = ("boom", "joint", "fitted", "best without a FAIL", "saved mass")
 
 
 def ranking(choice: Choice) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -105,7 +105,7 @@ def saving(choices: Sequence[Choice]) -> list[tuple[str, ...]]:
     return rows
 
 
-ANSWER = ("boom", "joint", "fitted", "lightest that does not fail", "mass", "saves", "verdict")
+ANSWER = ("boom", "joint", "fitted", "best that does not fail", "mass", "saves", "verdict")
 """Columns of `answer_rows`."""
 
 
@@ -137,7 +137,7 @@ def conclusion(choices: Sequence[Choice]) -> tuple[str, ...]:
             total = sum(choice.saves or 0.0 for choice in spared)
             said.append(f"{total:.1f} kg can be saved on {', '.join(choice.joint for choice in spared)}")
         elif any(choice.fitted is not None for choice in parts):
-            said.append("no lighter drive does")
+            said.append("no drive of a known mass that does is lighter")
         if none:
             said.append(f"the catalogue has no drive that does for {', '.join(none)}")
         sentences.append(f"{variant}: {'; '.join(said) or 'each joint has a drive that does'}")

@@ -1,8 +1,8 @@
 """Checks of a strain-wave gearbox against its datasheet.
 
 The rows follow Harmonic Drive's selection procedure. It is also applied to the Cone Drive CBG,
-because that maker's own procedure was not found. If a datasheet does not give a figure, the row is NOT
-CHECKABLE; it never passes.
+because that maker's own procedure was not found. If a datasheet does not give a figure, the row is
+NOT CHECKABLE; it never passes.
 """
 
 from collections.abc import Iterator
@@ -145,7 +145,7 @@ def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
 
 
 def rated_L10(gear: Gearbox) -> float | None:
-    """Return the life L10 [s] at rated torque and rated input speed: printed, or a fifth of the printed L50."""
+    """Return the life L10 [s] at rated torque and input speed: printed, or a fifth of L50."""
     if gear.rated_L10 is not None:
         return gear.rated_L10
     return None if gear.rated_life is None else gear.rated_life / L50_OVER_L10

@@ -1,8 +1,9 @@
 """Checks of a servo motor and its gearbox against the motor's datasheet.
 
 A servo motor may give its peak torque for a short time; what it gives for long is its continuous
-torque, which the RMS torque of the duty cycle must not exceed. Datasheets print how torque falls
-above the rated speed as a picture only, so a motion above that speed is NOT CHECKABLE.
+torque, which the RMS torque of the duty cycle must not exceed. Datasheets print torque against
+speed as a picture only: both torques are taken to last up to the rated speed, and a motion above
+that speed is NOT CHECKABLE.
 """
 
 from collections.abc import Iterator
@@ -76,7 +77,7 @@ def _peak_row(view: JointView, drive: Drive, kind: CheckKind, torque: Array) -> 
         rated = "not printed" if motor.rated_speed is None else f"{motor.rated_speed * 30.0 / np.pi:.0f} rpm"
         why = f"{sheet(motor)}; above the rated speed ({rated}) the torque is printed as a picture at most"
         return view.unknown(kind, why=why, demand=most)
-    origin = Origin(Basis.PRINTED, f"{sheet(motor)}, peak torque")
+    origin = Origin(Basis.PRINTED, f"{sheet(motor)}, peak torque, taken to last up to the rated speed")
     return view.compared(kind, demand=most, limit=motor.peak_torque, at=at, origin=origin)
 
 
@@ -86,7 +87,7 @@ def _within(drive: Drive, fastest: float) -> bool:
 
 
 def _rms_row(view: JointView, drive: Drive, torque: Array) -> Row:
-    """Return the row of the RMS torque; the larger torque of both directions counts at each sample."""
+    """Return the row of the RMS torque; the larger torque of both directions counts."""
     motor = drive.motor
     braked = drive.brake is not None and drive.brake.value  # a motor without a brake stays on in a pause
     driven = np.where(view.duty.powered, torque, 0.0) if braked else torque
@@ -99,7 +100,7 @@ def _rms_row(view: JointView, drive: Drive, torque: Array) -> Row:
 
 
 def _speed_row(view: JointView, drive: Drive) -> Row:
-    """Return the row of the speed. At or below the rated speed a sheet need not print a larger one."""
+    """Return the row of the speed; up to the rated speed a sheet need not print a larger one."""
     motor = drive.motor
     fastest, at = view.peak(view.qd)
     limit = motor.rated_speed if motor.max_speed is None and _within(drive, fastest) else motor.max_speed
