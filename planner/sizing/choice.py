@@ -136,12 +136,29 @@ class Judged:
 
 
 def candidates(boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[float] = ()) -> tuple[Drive | LinearDrive, ...]:
+    """Return the `combinations` of a catalogue for a joint of which the motor torque can be checked.
+
+    Motors and gearboxes whose datasheets do not give it are left out; see `untried`.
+
+    Args:
+        boom: see `combinations`.
+        joint: see `combinations`.
+        catalogue: see `combinations`.
+        voltages: see `combinations`.
+
+    Raises:
+        InputError: see `combinations`.
+    """
+    every = combinations(boom, joint, catalogue, voltages)
+    return tuple(d for d in every if isinstance(d, LinearDrive) or (_has_losses(d.gearbox) and _has_torque(d.motor)))
+
+
+def combinations(
+    boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[float] = ()
+) -> tuple[Drive | LinearDrive, ...]:
     """Return all combinations of motor, wiring, bus voltage and gearbox of a catalogue for a joint.
 
-    A servo motor has neither wiring nor bus voltage. Motors and gearboxes whose datasheets do not
-    give the torque at the motor are left out; see `untried`.
-
-    For the extension, return every actuator.
+    A servo motor has neither wiring nor bus voltage. For the extension, return every actuator.
 
     Args:
         boom: the boom, with its fitted drives.
@@ -163,7 +180,6 @@ def candidates(boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[
         Drive(motor, gearbox, supply, wiring, None if fitted is None else fitted.brake)
         for gearbox in catalogue.gearboxes.values()
         for motor in catalogue.motors.values()
-        if _has_losses(gearbox) and _has_torque(motor)
         for wiring, supply in _fed(motor, fitted, supplies)
     )
 

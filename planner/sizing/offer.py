@@ -1,6 +1,6 @@
 """What a drive offers, item by item, against what a mission requires of it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from operator import ge, le
 
@@ -10,6 +10,9 @@ from boom_model import Drive, LinearDrive
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_limit, reflected_inertia
 from planner.checks.drives.gearbox import rated_L10
 from planner.sizing.requirement import Requirement
+
+NEAREST = 3
+"""Drives that `nearest` returns."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,50 @@ def shortfalls(need: Requirement, drive: Drive | LinearDrive) -> tuple[Shortfall
     """
     items = _actuator(need, drive) if isinstance(drive, LinearDrive) else _drive(need, drive)
     return tuple(items)
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A drive of the catalogue against a requirement sheet."""
+
+    drive: Drive | LinearDrive
+    missing: tuple[Shortfall, ...]
+    """What it does not meet; see `shortfalls`."""
+
+    @property
+    def name(self) -> str:
+        """Names of motor and gearbox, or of the actuator."""
+        if isinstance(self.drive, LinearDrive):
+            return self.drive.actuator.name
+        return f"{self.drive.motor.name} + {self.drive.gearbox.name}"
+
+    @property
+    def short(self) -> tuple[Shortfall, ...]:
+        """Items whose printed figure is not enough."""
+        return tuple(each for each in self.missing if each.offered is not None)
+
+    @property
+    def unprinted(self) -> tuple[Shortfall, ...]:
+        """Items that the datasheet does not print."""
+        return tuple(each for each in self.missing if each.offered is None)
+
+
+def nearest(need: Requirement, drives: Iterable[Drive | LinearDrive], count: int = NEAREST) -> tuple[Offer, ...]:
+    """Return the drives that come nearest to a sheet, each motor and gearbox once.
+
+    Those come first of which the fewest figures are not enough, then those of which the fewest are
+    not printed, then the lightest.
+    """
+    best: dict[str, Offer] = {}
+    for offer in sorted((Offer(drive, shortfalls(need, drive)) for drive in drives), key=_distance):
+        best.setdefault(offer.name, offer)
+    return tuple(best.values())[:count]
+
+
+def _distance(offer: Offer) -> tuple[int, int, float]:
+    drive = offer.drive
+    parts = (drive.actuator.mass,) if isinstance(drive, LinearDrive) else (drive.motor.mass, drive.gearbox.mass)
+    return len(offer.short), len(offer.unprinted), sum(np.inf if mass is None else mass for mass in parts)
 
 
 _Test = Callable[[float, float], bool]

@@ -8,6 +8,7 @@ import pytest
 from boom_model import (
     JOINTS,
     Boom,
+    Catalogue,
     Drive,
     Gearbox,
     InputError,
@@ -27,9 +28,9 @@ from planner.checks.evaluation import at_samples
 from planner.checks.motion_checks import joint_views
 from planner.missions.mission import load_mission, plan_cycle
 from planner.motion.vehicle import load_case
-from planner.sizing.choice import candidates, size
+from planner.sizing.choice import candidates, combinations, size
 from planner.sizing.day import Day
-from planner.sizing.offer import shortfalls
+from planner.sizing.offer import nearest, shortfalls
 from planner.sizing.requirement import STEPS, requirements
 from planner.sizing.requirement_pictures import requirement_pictures
 from planner.sizing.requirement_tables import requirement_json, requirement_markdown, requirement_notes
@@ -200,6 +201,43 @@ def test_what_meets_the_sheet_passes_the_checks(joint, lived, needs):
     assert len(meeting) >= 0.4 * passing  # the sheet is not far stricter than the checks
 
 
+@pytest.mark.parametrize("joint", ["inner", "extension"])
+def test_the_nearest_drives_lack_least(joint, lived, needs):
+    rng, need = np.random.default_rng(5), needs[joint]
+    drives = [random_actuator(rng, need) if need.is_length else random_drive(rng, need) for _ in range(40)]
+    parts = ("actuator",) if need.is_length else ("motor", "gearbox")
+    named = [
+        replace(drive, **{part: replace(getattr(drive, part), name=f"{part} {k}") for part in parts})
+        for k, drive in enumerate(drives)
+    ]
+    found = nearest(need, [*named, *named], 40)
+    assert len({offer.name for offer in found}) == 40
+    lacking = [(len(offer.short), len(offer.unprinted)) for offer in found]
+    assert lacking == sorted(lacking)
+    assert found[0].missing == ()
+    (first,) = size(RUBBING, lived, joint, [found[0].drive])
+    assert first.verdict is Verdict.PASS
+    for offer in found:
+        assert offer.missing == shortfalls(need, offer.drive)
+        assert set(offer.short) | set(offer.unprinted) == set(offer.missing)
+    assert len(nearest(need, named)) == 3
+
+
+def test_nearest_drives_stand_in_the_report_and_in_json(needs):
+    catalogue = Catalogue.load()
+    sheets = (needs["lower"], needs["extension"])
+    offers = {need.joint: nearest(need, combinations(BOOM, need.joint, catalogue)) for need in sheets}
+    text = requirement_markdown("sheet", sheets, day(), offers, (), ())
+    assert "| joint | drive of the catalogue | not enough | not printed |" in text
+    for joint, group in offers.items():
+        for offer in group:
+            assert f"| {joint} | {offer.name} |" in text
+    told = requirement_json(sheets[1], offers["extension"])["nearest"]
+    assert [each["drive"] for each in told] == [offer.name for offer in offers["extension"]]
+    assert all("stroke" in each["not_printed"] and not each["not_enough"] for each in told)
+    assert "force | acceleration" in text[text.index("## extension") :]
+
+
 @pytest.mark.parametrize("joint", ["yaw", "inner", "lower", "wrist"])
 def test_a_servo_that_meets_the_sheet_passes_the_checks(joint, lived, needs):
     rng = np.random.default_rng(40 + JOINTS.index(joint))
@@ -299,7 +337,7 @@ def test_a_joint_at_rest_has_a_sheet(tmp_path):
     assert requirement_json(lower)["largest_reflected_inertia_kg_m2"] is None
     assert yaw.starts == 1
     assert not shortfalls(extension, LinearDrive(replace(SCREW, static_force=extension.hold.torque)))
-    text = requirement_markdown("sheet", (lower, extension), day(), requirement_notes((lower, extension)), ())
+    text = requirement_markdown("sheet", (lower, extension), day(), {}, requirement_notes((lower, extension)), ())
     assert "at most any" not in text
 
 
@@ -316,7 +354,7 @@ def test_bad_requests_are_refused(lived):
 
 def test_text_json_and_picture_hold_the_same_figures(needs):
     sheets = list(needs.values())
-    text = requirement_markdown("sheet", sheets, day(), requirement_notes(sheets), ())
+    text = requirement_markdown("sheet", sheets, day(), {}, requirement_notes(sheets), ())
     for need in sheets:
         found = requirement_json(need)
         assert found["joint"] == need.joint
