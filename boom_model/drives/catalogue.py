@@ -34,6 +34,7 @@ from boom_model.plausible import (
     RATIO,
     RESISTANCE,
     ROTOR_INERTIA,
+    SHOCK_EVENTS,
     STEP_ANGLE,
     STIFFNESS,
     STROKE,
@@ -186,6 +187,7 @@ class _GearboxTable(Table):
     rated_life_h: Annotated[float, RATED_LIFE] | None = None
     rated_L10_h: Annotated[float, RATED_LIFE] | None = None
     rated_input_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
+    peak_events: Annotated[float, SHOCK_EVENTS] | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> "_GearboxTable":

@@ -130,6 +130,8 @@ class Gearbox:
     """Input speed of the rated life [rad/s]."""
     rated_L10: float | None = None
     """Life L10 at continuous torque and rated input speed [s]: nine of ten gearboxes reach it."""
+    peak_events: float | None = None
+    """Number of times that a planetary gearbox may bear its peak torque; None for a strain wave."""
 
 
 @dataclass(frozen=True)

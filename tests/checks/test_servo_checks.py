@@ -10,6 +10,7 @@ from boom_model.drives.drive import available_torque, motor_limit, speed_for_tor
 from planner import Verdict
 from planner.checks.drives.duty import Duty
 from planner.checks.drives.gearbox import gearbox_rows
+from planner.checks.drives.joint_view import Shock
 from planner.checks.drives.motor import motor_rows
 from planner.checks.motion_checks import drive_rows
 from tests.builders import joint_view, row
@@ -170,3 +171,16 @@ def test_a_printed_L10_is_the_life_at_rated_torque_and_speed(name, hours):
         assert found.verdict is Verdict.INFO
         assert "L50" not in found.source
         assert "another maker" not in found.source
+
+
+def test_a_planetary_gearbox_bears_its_peak_as_often_as_the_sheet_says():
+    """1000 emergency stops, however long they last; and no life of a strain wave is read into it."""
+    drive = replace(DRIVE, gearbox=Catalogue.load().gearboxes["TP010-10"])
+    motion = joint_view(tau=200.0, qd=[10 * RPM, 99.0], t=[0.0, 1.0])
+    for events, verdict in ((1000.0, Verdict.PASS), (1010.0, Verdict.FAIL), (None, Verdict.NOT_CHECKABLE)):
+        shock = Shock(np.zeros((2, 5)), True, np.array([True, False]), 0.03, events)
+        found = row(gearbox_rows(motion, drive, shock), "gearbox momentary peaks")
+        assert (found.verdict, found.limit) == (verdict, None if events is None else 1000.0)
+    life = row(gearbox_rows(motion, drive, None), "gearbox life")
+    assert (life.verdict, life.limit) == (Verdict.NOT_CHECKABLE, None)
+    assert "indicative" not in life.source

@@ -1,7 +1,7 @@
-"""Checks of a strain-wave gearbox against its datasheet.
+"""Checks of a strain-wave or planetary gearbox against its datasheet.
 
-The rows follow Harmonic Drive's selection procedure. It is also applied to the Cone Drive CBG,
-because that maker's own procedure was not found. If a datasheet does not give a figure, the row is
+The rows follow Harmonic Drive's selection procedure. It is also applied to other makers' gearboxes,
+because their own procedures were not found. If a datasheet does not give a figure, the row is
 NOT CHECKABLE; it never passes.
 """
 
@@ -76,12 +76,15 @@ def _torque_rows(view: JointView, gear: Gearbox, shock: Shock | None, procedure:
 def _events_row(view: JointView, gear: Gearbox, shock: Shock) -> Row:
     """Return the row of the number of shocks against 1e4 / (2 (n / 60) N t).
 
-    n is the joint's largest speed during the shock [rpm], N the gear ratio, t the duration.
+    n is the joint's largest speed during the shock [rpm], N the gear ratio, t the duration. Of a
+    planetary gearbox the sheet prints the number itself.
     """
     kind, speed = CheckKind.GEARBOX_MOMENTARY_PEAKS, float(np.abs(view.qd[shock.inside]).max(initial=0.0))
     turns = gear.ratio * speed / (2.0 * np.pi) * shock.duration
     allowed = MOMENTARY_CYCLES / max(2.0 * turns, 1.0)  # a shock at rest loads the teeth once
     origin = Origin(Basis.PRINTED, f"1e4 / (2 (n / 60) N t) with {turns:.2g} turns of the input per shock; {_procedure(gear)}")
+    if gear.peak_events is not None:
+        allowed, origin = gear.peak_events, Origin(Basis.PRINTED, gear.source)
     if shock.events is None or not shock.resolved:
         why = f"the number of shocks is not given (allowed: {allowed:.0f}); {origin.source}"
         return view.unknown(kind, why=why, demand=shock.events)
@@ -117,7 +120,8 @@ def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
     printed = rated is not None and gear.rated_input_speed is not None
     life, rated_speed = (rated, gear.rated_input_speed) if printed else (FAMILY_LIFE / L50_OVER_L10, FAMILY_INPUT_SPEED)
     L10 = None
-    if gear.continuous_torque is not None and life is not None and rated_speed is not None:
+    similar = printed or gear.peak_events is None  # a planetary gearbox wears otherwise
+    if similar and gear.continuous_torque is not None and life is not None and rated_speed is not None:
         L10 = life * (rated_speed / speed) * (gear.continuous_torque / average) ** 3
     if L10 is None or not printed:
         figure = "" if L10 is None else f"; indicative L10 {L10 / 3600.0:,.0f} h from 35,000 h at 2000 rpm of similar gearboxes"

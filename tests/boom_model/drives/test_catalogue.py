@@ -87,8 +87,34 @@ SA_PD = {
 # LINAK data sheet LA31: force [N], speed [mm/s] and self-locking force [N], by the pitch [mm].
 LA31 = {3: (3500, 5, 3500), 6: (2500, 10, 2500)}
 
-CHECKABLE = {"CBG320160"}
-"""The gearboxes whose efficiency is printed as a number."""
+# Beckhoff AG2400, pages TP004 MF and TP010 MF, one stage: weight [kg], backlash [arcmin]; then by
+# ratio inertia with the hub E of 19 mm [kg cm^2], nominal, acceleration and emergency stop torque
+# [Nm], nominal input speed [rpm], idle torque [Nm].
+AG2400 = {
+    "TP004": (
+        1.4,
+        4,
+        {
+            4: (0.57, 27, 66, 100, 3300, 0.56),
+            5: (0.54, 27, 66, 100, 3300, 0.48),
+            7: (0.51, 26, 66, 100, 4000, 0.37),
+            8: (0.51, 26, 42, 100, 4000, 0.37),
+            10: (0.49, 27, 42, 100, 4000, 0.31),
+        },
+    ),
+    "TP010": (
+        3.8,
+        3,
+        {
+            4: (0.95, 84, 172, 250, 2600, 1.3),
+            5: (0.79, 81, 172, 250, 2900, 1.1),
+            7: (0.64, 81, 172, 251, 3100, 0.84),
+            8: (0.64, 80, 126, 251, 3100, 0.84),
+            10: (0.57, 81, 126, 251, 3100, 0.64),
+        },
+    ),
+}
+AG_UNITS = [(size, ratio) for size, (*_, ratios) in AG2400.items() for ratio in ratios]
 
 
 def close(value):
@@ -110,7 +136,9 @@ def test_every_entry_is_in_a_table_of_the_tests():
         *(f"TBM-{name}" for name in TBM),
     }
     units = [("CSF", size, ratio) for size, ratio in product(CSF, RATIOS)] + [("CSG", *key) for key in CSG]
-    assert set(SHIPPED.gearboxes) == CHECKABLE | {f"{series}-{size}-{ratio}-2UH" for series, size, ratio in units}
+    planetary = {f"{size}-{ratio}" for size, ratio in AG_UNITS}
+    strain_wave = {f"{series}-{size}-{ratio}-2UH" for series, size, ratio in units}
+    assert set(SHIPPED.gearboxes) == {"CBG320160"} | planetary | strain_wave
     assert set(SHIPPED.actuators) == {*SA_PD, *(f"LA31-{pitch}mm" for pitch in LA31)}
 
 
@@ -129,9 +157,11 @@ def test_the_torques_of_a_gearbox_are_in_order(entry):
     rising = [entry.continuous_torque, entry.max_average_torque, entry.start_stop_torque, entry.peak_torque]
     printed = [torque for torque in rising if torque is not None]
     assert all(one < other for one, other in pairwise(printed))
-    first, second = entry.torsion_torques
-    assert first < second
-    assert all(one < other for one, other in pairwise(entry.torsion_stiffness))
+    assert (entry.torsion_torques is None) is (entry.torsion_stiffness is None) is (entry.peak_events is not None)
+    if entry.torsion_torques is not None:
+        first, second = entry.torsion_torques
+        assert first < second
+        assert all(one < other for one, other in pairwise(entry.torsion_stiffness))
 
 
 @pytest.mark.parametrize("ratio", RATIOS)
@@ -198,11 +228,26 @@ def test_what_only_some_units_print():
     found = gear("CSF", 25, 50)
     assert (found.mass, found.starting_torque, found.backdrive_torque) == (1.5, 0.15, 9.0)
     assert found.max_average_input_speed == close(3500 * RPM)
-    inertias = {name: g.input_inertia for name, g in SHIPPED.gearboxes.items() if g.input_inertia is not None}
+    strain_wave = {name: g for name, g in SHIPPED.gearboxes.items() if g.peak_events is None}
+    inertias = {name: g.input_inertia for name, g in strain_wave.items() if g.input_inertia is not None}
     assert inertias == {"CBG320160": 176e-6} | {f"CSF-25-{ratio}-2UH": close(41.3e-6) for ratio in RATIOS}
-    masses = {name: g.mass for name, g in SHIPPED.gearboxes.items() if g.mass is not None}
+    masses = {name: g.mass for name, g in strain_wave.items() if g.mass is not None}
     assert masses == {"CBG320160": 3.3, "CSF-25-50-2UH": 1.5, "CSG-20-100-2UH": 0.98, "CSG-32-100-2UH": 3.2}
     assert gear("CSG", 32, 100).max_average_input_speed == close(3500 * RPM)
+
+
+@pytest.mark.parametrize(("size", "ratio"), AG_UNITS)
+def test_ag2400_is_that_of_beckhoffs_page(size, ratio):
+    weight, arcmin, ratios = AG2400[size]
+    inertia, nominal, acceleration, stop, speed, idle = ratios[ratio]
+    found = SHIPPED.gearboxes[f"{size}-{ratio}"]
+    assert (found.ratio, found.mass, found.peak_events) == (ratio, weight, 1000)
+    assert (found.continuous_torque, found.start_stop_torque, found.peak_torque) == (nominal, acceleration, stop)
+    assert (found.no_load_input_torque, found.efficiency) == (idle, close(0.97))
+    assert found.input_inertia == close(inertia * 1e-4)
+    assert found.backlash == pytest.approx(np.radians(arcmin / 60), rel=1e-4)
+    assert (found.max_input_speed, found.max_average_input_speed) == close((7500 * RPM, speed * RPM))
+    assert found.rated_life is found.rated_L10 is found.max_average_torque is None
 
 
 # Motors
