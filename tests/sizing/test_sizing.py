@@ -23,6 +23,7 @@ from planner.sizing.choice import (
     too_high,
     untried,
 )
+from planner.sizing.pictures import sizing_pictures
 from planner.sizing.tables import conclusion, motors, outcome, ranking, saving, sizing_json, sizing_markdown, sizing_notes
 from tests.builders import SCREW, STRONG_CATALOGUE, UNDERSIZED_MISSION, planned_mission, thesis_catalogue, with_drives
 
@@ -325,6 +326,16 @@ def test_what_lacks_fewer_limits_comes_before_what_is_lighter(cycle):
     catalogue = replace(CATALOGUE, motors={"LACKING": lacking, known.name: known})
     first, *_ = size(BOOM, cycle, "inner", candidates(BOOM, "inner", catalogue))
     assert first.drive.motor is known
+
+
+def test_the_picture_of_a_large_catalogue_names_the_best_drives(cycle):
+    choices = choose({"as it is": BOOM}, cycle, ("inner", "wrist"), Catalogue.load())
+    (figure,) = sizing_pictures(choices).values()
+    (legend,) = figure.legends
+    named = [text.get_text() for text in legend.get_texts()]
+    assert len(named) == 7 + len(["another drive", "as it is", "hollow"])
+    assert {choice.lightest.name for choice in choices} <= set(named)
+    figure.canvas.draw()  # a layout that does not fit is a warning, and a warning an error
 
 
 def test_a_choice_of_unknown_mass_is_not_called_heavier(main):
