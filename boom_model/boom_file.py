@@ -182,7 +182,7 @@ class _DriveTable(Table):
     motor: str
     gearbox: str
     bus_voltage_V: _Sourced[Annotated[float, VOLTAGE]] | None = None
-    wiring: _Sourced[Literal["parallel", "series"]] | None = None
+    wiring: _Sourced[Literal["parallel", "series", "single"]] | None = None
     brake: _Sourced[bool] | None = None
 
 

@@ -161,7 +161,13 @@ def _stronger(boom: Boom, joints: Sequence[int], factor: float) -> Boom:
         motor, gear = drive.motor, drive.gearbox
         return replace(
             drive,
-            motor=replace(motor, running_torque=times(motor.running_torque), holding_torque=times(motor.holding_torque)),
+            motor=replace(
+                motor,
+                running_torque=times(motor.running_torque),
+                holding_torque=times(motor.holding_torque),
+                rated_torque=times(motor.rated_torque),
+                peak_torque=times(motor.peak_torque),
+            ),
             gearbox=replace(
                 gear,
                 start_stop_torque=times(gear.start_stop_torque),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from boom_model import Basis, Boom, LinearActuator, Origin, kinetic_energy, potential_energy
+from boom_model import Basis, Boom, Catalogue, LinearActuator, Origin, kinetic_energy, potential_energy
 from boom_model.arrays import Array
 from boom_model.keep_out import Box, Capsule, KeepOut
 from planner import Move, Trajectory, plan
@@ -57,6 +57,16 @@ def with_shapes(
 POST = Capsule("post", np.array([1.0, 1.0, -1.0]), np.array([1.0, 1.0, 0.6]), 0.1, ORIGIN)
 ROUND_POST = np.array([np.radians(10), 0.5, 2.6, 0.3, 0.0]), np.array([np.radians(80), 0.5, 2.6, 0.3, 0.0])
 """Start and goal on either side of the post: the straight move between them runs into it."""
+
+# Drives
+
+
+def thesis_catalogue() -> Catalogue:
+    """The thesis's four motors and its gearbox out of the shipped catalogue: few enough to try them all."""
+    shipped = Catalogue.load()
+    motors = {name: motor for name, motor in shipped.motors.items() if name.startswith("MST")}
+    return replace(shipped, motors=motors, gearboxes={"CBG320160": shipped.gearboxes["CBG320160"]}, actuators={})
+
 
 # Moves and missions
 

@@ -17,7 +17,7 @@ PAGES = {page.stem: page.read_text(encoding="utf-8") for page in sorted((ROOT / 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BOOM = Boom.load()
 MISSION, *_ = re.findall(r"```toml\n(.*?)```", PAGES["drives"], flags=re.DOTALL)
-ACTUATOR, _KEEP_OUT = re.findall(r"```toml\n(.*?)```", PAGES["your-boom"], flags=re.DOTALL)
+ACTUATOR, SERVO, _KEEP_OUT = re.findall(r"```toml\n(.*?)```", PAGES["your-boom"], flags=re.DOTALL)
 
 
 def test_the_thesis_s_design_is_judged_as_printed():
@@ -69,6 +69,11 @@ def test_the_mission_of_the_readme_can_be_planned(tmp_path):
 def test_the_actuator_of_the_readme_can_be_read(tmp_path):
     (tmp_path / "mine.toml").write_text(ACTUATOR)
     assert Catalogue.load().with_file(tmp_path / "mine.toml").actuators["MINE"].stroke == 1.0
+
+
+def test_the_servo_of_the_readme_can_be_read(tmp_path):
+    (tmp_path / "mine.toml").write_text(SERVO)
+    assert Catalogue.load().with_file(tmp_path / "mine.toml").motors["SERVO"].is_servo
 
 
 def test_readme_and_guide_are_short():

@@ -34,6 +34,7 @@ from boom_model.plausible import (
     RATIO,
     RESISTANCE,
     ROTOR_INERTIA,
+    SHOCK_EVENTS,
     STEP_ANGLE,
     STIFFNESS,
     STROKE,
@@ -60,7 +61,7 @@ class Catalogue:
 
     @staticmethod
     def load(path: str | Path | None = None) -> "Catalogue":
-        """Return the shipped catalogue (thesis, Appendix E), or another file of the same form.
+        """Return the shipped catalogue, or another file of the same form.
 
         Raises:
             InputError: the file cannot be read or is malformed; the message names file and key.
@@ -107,7 +108,7 @@ class _WindingTable(Table):
 
 
 class _MotorTable(Table):
-    """Table of a motor.
+    """Table of a motor: a stepper has `step_deg`, a servo its torques and speeds.
 
     No check uses the phase voltage, the temperatures and the shaft loads; they are in the file for
     its readers.
@@ -115,7 +116,7 @@ class _MotorTable(Table):
 
     source: _Text
     tolerance_percent: Annotated[float, PERCENT] | None = None
-    step_deg: Annotated[float, STEP_ANGLE]
+    step_deg: Annotated[float, STEP_ANGLE] | None = None
     full_step_accuracy_deg: Annotated[float, ACCURACY] | None = None
     microstep_accuracy_deg: Annotated[float, ACCURACY] | None = None
     max_voltage_V: Annotated[float, VOLTAGE] | None = None
@@ -129,12 +130,33 @@ class _MotorTable(Table):
     max_thrust_load_kg: Annotated[float, DRIVE_MASS] | None = None
     parallel: _WindingTable | None = None
     series: _WindingTable | None = None
+    single: _WindingTable | None = None
+    rated_torque_Nm: Annotated[float, TORQUE] | None = None
+    peak_torque_Nm: Annotated[float, TORQUE] | None = None
+    rated_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
+    max_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> "_MotorTable":
+        servo = [name for name in _SERVO if getattr(self, name) is not None]
+        stepper = [name for name in _STEPPER if getattr(self, name) is not None]
+        if "step_deg" in stepper and servo:
+            raise ValueError(f"{servo[0]} is for a servo motor, which has no step_deg")
+        if "step_deg" not in stepper and (stepper or not servo):
+            raise ValueError(
+                "step_deg is missing; a servo motor has rated_torque_Nm in its place, and none of a stepper's figures"
+            )
         _require_order("running_torque_Nm", self.running_torque_Nm, "holding_torque_Nm", self.holding_torque_Nm)
+        _require_order("rated_torque_Nm", self.rated_torque_Nm, "peak_torque_Nm", self.peak_torque_Nm)
+        _require_order("rated_speed_rpm", self.rated_speed_rpm, "max_speed_rpm", self.max_speed_rpm)
         return self
 
+
+_SERVO = ("rated_torque_Nm", "peak_torque_Nm", "rated_speed_rpm", "max_speed_rpm")
+_STEPPER = (
+    "step_deg", "full_step_accuracy_deg", "microstep_accuracy_deg", "holding_torque_Nm", "running_torque_Nm",
+    "parallel", "series", "single",
+)  # fmt: skip
 
 _RATINGS = ("max_average_torque_Nm", "start_stop_torque_Nm", "peak_torque_Nm")
 """Torque ratings of a gearbox in ascending order."""
@@ -163,7 +185,9 @@ class _GearboxTable(Table):
     max_input_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
     max_average_input_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
     rated_life_h: Annotated[float, RATED_LIFE] | None = None
+    rated_L10_h: Annotated[float, RATED_LIFE] | None = None
     rated_input_speed_rpm: Annotated[float, INPUT_SPEED] | None = None
+    peak_events: Annotated[float, SHOCK_EVENTS] | None = None
 
     @model_validator(mode="after")
     def _in_order(self) -> "_GearboxTable":
@@ -245,7 +269,8 @@ def _in_si(table: Table, kind: type) -> dict[str, Any]:
 
 def _motor(name: str, t: _MotorTable) -> Motor:
     values = _in_si(t, Motor)
-    return Motor(name=name, source=t.source, parallel=_winding(t.parallel), series=_winding(t.series), **values)
+    parallel, series, single = (_winding(table) for table in (t.parallel, t.series, t.single))
+    return Motor(name=name, source=t.source, parallel=parallel, series=series, single=single, **values)
 
 
 def _gearbox(name: str, t: _GearboxTable) -> Gearbox:

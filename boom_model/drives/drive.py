@@ -11,10 +11,12 @@ from boom_model.provenance import Origin, Sourced
 
 
 class Wiring(StrEnum):
-    """Connection of the two halves of each phase of an 8-lead stepper motor."""
+    """Connection of a stepper motor's phases: of the two halves of each, or of the only winding."""
 
     PARALLEL = "parallel"
     SERIES = "series"
+    SINGLE = "single"
+    """The only winding of a motor with four leads."""
 
 
 STEPPER_MARGIN = 0.5
@@ -38,12 +40,12 @@ class Winding:
 
 @dataclass(frozen=True)
 class Motor:
-    """Hybrid stepper motor. None stands for a value that the datasheet does not print."""
+    """Hybrid stepper motor or servo motor. None is a value that the datasheet does not print."""
 
     name: str
     source: str
-    step: float
-    """Full step [rad]."""
+    step: float | None
+    """Full step [rad]; None for a servo motor."""
     max_voltage: float | None
     holding_torque: float | None
     running_torque: float | None
@@ -57,6 +59,35 @@ class Motor:
     """Largest error of a microstep without load [rad]."""
     tolerance: float | None
     """Fraction by which a motor may differ from its datasheet."""
+    single: Winding | None = None
+    """The only winding of a stepper motor with four leads."""
+    rated_torque: float | None = None
+    """Continuous torque of a servo motor [Nm]."""
+    peak_torque: float | None = None
+    """Largest torque of a servo motor for a short time [Nm]."""
+    rated_speed: float | None = None
+    """Speed of a servo motor up to which its torques hold [rad/s]."""
+    max_speed: float | None = None
+    """Largest speed of a servo motor [rad/s]."""
+
+    @property
+    def is_servo(self) -> bool:
+        """Whether it is a servo motor, which has no step."""
+        return self.step is None
+
+    @property
+    def windings(self) -> dict[Wiring, Winding]:
+        """Data of the windings that the datasheet prints, by wiring."""
+        each = {Wiring.PARALLEL: self.parallel, Wiring.SERIES: self.series, Wiring.SINGLE: self.single}
+        return {wiring: winding for wiring, winding in each.items() if winding is not None}
+
+    @property
+    def torque_margin(self) -> float:
+        """Required (available - required) / required torque; STEPPER_MARGIN, or 0 for a servo.
+
+        A servo motor does not lose steps when its torque is short for a moment.
+        """
+        return 0.0 if self.is_servo else STEPPER_MARGIN
 
 
 @dataclass(frozen=True)
@@ -97,6 +128,10 @@ class Gearbox:
     """Life L50 at continuous torque and rated input speed [s]: half of the gearboxes reach it."""
     rated_input_speed: float | None
     """Input speed of the rated life [rad/s]."""
+    rated_L10: float | None = None
+    """Life L10 at continuous torque and rated input speed [s]: nine of ten gearboxes reach it."""
+    peak_events: float | None = None
+    """Number of times that a planetary gearbox may bear its peak torque; None for a strain wave."""
 
 
 @dataclass(frozen=True)
@@ -118,9 +153,7 @@ class Drive:
     @property
     def winding(self) -> Winding | None:
         """Data of the motor in the chosen wiring; None if the wiring or its data is unknown."""
-        if self.wiring is None:
-            return None
-        return self.motor.parallel if self.wiring.value is Wiring.PARALLEL else self.motor.series
+        return None if self.wiring is None else self.motor.windings.get(self.wiring.value)
 
     @property
     def supply_origins(self) -> tuple[Origin, ...]:
@@ -149,9 +182,12 @@ def available_torque(drive: Drive, speed: ArrayLike) -> Array | None:
 
     p = 50 for a 1.8 degree step: the number of pole pairs is a quarter of the number of steps per
     turn. The datasheet prints its torque-speed curve only as a picture, so this is an estimate of
-    our own. It neglects iron losses, detent torque and resonance. Return None without voltage,
-    wiring or motor data.
+    our own. It neglects iron losses, detent torque and resonance. A servo motor has its peak torque
+    up to its rated speed, then its rated power (our own reading), and nothing above its largest
+    speed. Return None without voltage, wiring or motor data; a servo motor needs no voltage.
     """
+    if drive.motor.is_servo:
+        return _servo_torque(drive.motor, np.abs(np.asarray(speed, dtype=float)))
     terms = _curve_terms(drive)
     if terms is None or drive.motor.running_torque is None:
         return None
@@ -162,13 +198,22 @@ def available_torque(drive: Drive, speed: ArrayLike) -> Array | None:
     return available
 
 
+def _servo_torque(motor: Motor, speed: Array) -> Array | None:
+    rated, peak, corner = motor.rated_torque, motor.peak_torque, motor.rated_speed
+    if rated is None or peak is None or corner is None:
+        return None
+    beyond = rated * corner / np.maximum(speed, corner)
+    torque = np.where(speed <= corner, peak, beyond)
+    return torque if motor.max_speed is None else np.where(speed <= motor.max_speed, torque, 0.0)
+
+
 def speed_for_torque(drive: Drive, torque: ArrayLike) -> Array | None:
     """Return the highest motor speed [rad/s] at which `available_torque` is at least `torque` [Nm].
 
     It solves (R I_p + K_m w)^2 + (p w L I_p)^2 = (V T_run / T)^2, a quadratic equation in w, and
     has the shape of `torque`. For T = T_run this is the corner speed. The speed is 0 if no speed
     gives the torque, and infinite if the torque is 0. Return None without voltage, wiring or motor
-    data.
+    data, and for a servo motor.
     """
     terms, running = _curve_terms(drive), drive.motor.running_torque
     if terms is None or running is None:
@@ -188,7 +233,7 @@ def _speed_on_curve(terms: tuple[float, float, float, float], running: float, to
 
 def _curve_terms(drive: Drive) -> tuple[float, float, float, float] | None:
     winding, motor = drive.winding, drive.motor
-    if winding is None or drive.bus_voltage is None or motor.running_torque is None:
+    if winding is None or drive.bus_voltage is None or motor.running_torque is None or motor.step is None:
         return None
     peak_current = np.sqrt(2.0) * winding.current
     pole_pairs = 2.0 * np.pi / motor.step / 4.0
@@ -256,7 +301,7 @@ def drive_inertia(drive: Drive) -> float:
 def motor_limit(drive: Drive, speed: ArrayLike) -> Array | None:
     """Return the joint torque [Nm] that the motor allows at a joint speed [rad/s], of its shape.
 
-        (T_available(N speed) / (1 + margin) - T_noload) N eta
+        (T_available(N speed) / (1 + margin) - T_noload) N eta,  margin from `Motor.torque_margin`
 
     This bounds |tau + eta N^2 (J_rotor + J_gear) qdd|, where friction is part of tau. Without
     voltage or wiring, the running torque replaces the torque-speed curve; above low speed the limit
@@ -267,7 +312,7 @@ def motor_limit(drive: Drive, speed: ArrayLike) -> Array | None:
     motor = drive.motor.running_torque if curve is None else curve
     if motor is None or gear.efficiency is None or gear.no_load_input_torque is None:
         return None
-    spare = np.maximum(np.asarray(motor) / (1.0 + STEPPER_MARGIN) - gear.no_load_input_torque, 0.0)
+    spare = np.maximum(np.asarray(motor) / (1.0 + drive.motor.torque_margin) - gear.no_load_input_torque, 0.0)
     limit: Array = np.broadcast_to(spare * gear.ratio * gear.efficiency, w.shape)
     return limit
 

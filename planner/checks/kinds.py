@@ -175,6 +175,12 @@ class CheckKind(StrEnum):
     MOTOR_RESONANCE_DWELL = "motor resonance dwell", Part.MOTOR, Quantity.TIME, Severity.GUIDELINE
     MOTOR_AGAINST_GEARBOX = "motor against gearbox", Part.MOTOR, Quantity.MOMENT, Severity.GUIDELINE
 
+    SERVO_HOLD = "servo hold", Part.MOTOR, Quantity.MOMENT
+    SERVO_TORQUE = "servo torque", Part.MOTOR, Quantity.MOMENT
+    SERVO_TORQUE_REVERSED = "servo torque, reversed", Part.MOTOR, Quantity.MOMENT
+    SERVO_RMS_TORQUE = "servo RMS torque", Part.MOTOR, Quantity.MOMENT
+    SERVO_SPEED = "servo speed", Part.MOTOR, Quantity.SHAFT_SPEED
+
     ACTUATOR_PEAK_FORCE = "actuator peak force", Part.ACTUATOR, Quantity.FORCE
     ACTUATOR_MEAN_FORCE = "actuator mean force", Part.ACTUATOR, Quantity.FORCE
     ACTUATOR_HOLD = "actuator hold", Part.ACTUATOR, Quantity.FORCE

@@ -1,19 +1,20 @@
 """The commands that show the boom and the catalogue, and write a boom file to start from."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields
 from importlib.resources import files as resources
-from typing import Any
+from itertools import takewhile
+from typing import Any, TypeVar
 
 import click
 import numpy as np
 
-from boom_model import JOINTS, Boom, Catalogue, Drive, forward_kinematics
+from boom_model import JOINTS, Boom, Catalogue, Drive, Gearbox, LinearActuator, Motor, forward_kinematics
 from boom_model.boom import IS_LENGTH
 from boom_model.measured import measured_lines
 from boom_model.provenance import Basis, Origin
 from planner.cli.completion import OutFile
-from planner.cli.options import boom_option, given_catalogue, json_option, load_boom, outputs
+from planner.cli.options import all_option, boom_option, given_catalogue, json_option, load_boom, outputs
 from planner.cli.printing import print_files, print_json, print_lines, print_rows
 
 _RANKS = ("position", "velocity", "acceleration", "jerk")
@@ -56,45 +57,96 @@ def info(boom_file: str | None, as_json: bool) -> int:
 
 @click.command()
 @boom_option
+@all_option
 @json_option
-def catalogue(boom_file: str | None, as_json: bool) -> int:
-    """Show the motors, gearboxes and linear actuators of the catalogue, with datasheet figures.
+def catalogue(boom_file: str | None, whole: bool, as_json: bool) -> int:
+    """Show the motors, gearboxes and linear actuators of the catalogue, by series.
+
+    --all lists each one with its datasheet figures and their source.
 
     \b
     Example:
-      boom catalogue --catalogue mine.toml
+      boom catalogue --catalogue mine.toml --all
     """
     known = Catalogue.load().with_file(given_catalogue())
     if as_json:
         kinds = {field.name: getattr(known, field.name) for field in fields(known)}
         print_json({kind: {name: _plain(entry) for name, entry in entries.items()} for kind, entries in kinds.items()})
         return 0
-    motors = [
-        (m.name, _with(m.holding_torque, "Nm"), _with(m.running_torque, "Nm"), _with(m.mass, "kg"), m.source)
-        for m in known.motors.values()
+    for header, rows in (
+        (("motor", "kind", "holding, rated", "running, peak", "mass"), _rows(known.motors, _motor_figures)),
+        (("gearbox", "ratio", "rated", "average", "start, stop", "peak"), _rows(known.gearboxes, _gearbox_figures)),
+        (("actuator", "rated", "peak", "speed", "lead"), _rows(known.actuators, _actuator_figures)),
+    ):
+        shown = {name: [row] for name, row in rows.items()} if whole else _series(rows)
+        if shown:
+            print_rows(header, [(name, *_spread(group)) for name, group in shown.items()])
+    entries: list[Motor | Gearbox | LinearActuator] = [
+        *known.motors.values(),
+        *known.gearboxes.values(),
+        *known.actuators.values(),
     ]
-    print_rows(("motor", "holding", "running", "mass", "source"), motors, drop=("source",))
-    gears = [
-        (
-            g.name,
-            f"{g.ratio:g}",
-            _with(g.max_average_torque, "Nm"),
-            _with(g.start_stop_torque, "Nm"),
-            _with(g.peak_torque, "Nm"),
-            g.source,
-        )
-        for g in known.gearboxes.values()
-    ]
-    print_rows(("gearbox", "ratio", "average", "start, stop", "peak", "source"), gears, drop=("source",))
-    actuators = [
-        (a.name, _with(a.rated_force, "N"), _with(a.peak_force, "N"), _with(a.max_speed, "m/s"), a.source)
-        for a in known.actuators.values()
-    ]
-    if actuators:
-        print_rows(("actuator", "rated", "peak", "speed", "source"), actuators, drop=("source",))
-    else:
-        click.echo("no linear actuator; --catalogue FILE.toml adds your own")
+    sources: dict[str, list[str]] = {}
+    for entry in entries:
+        sources.setdefault(entry.source, []).append(entry.name)
+    print_lines("source", (f"{', '.join(names)}: {text}" for text, names in sources.items()) if whole else ())
+    print_lines(None, [] if whole else [f"{len(entries)} entries: --all lists each, with its source"])
     return 0
+
+
+_Figure = tuple[float | None, str] | str
+"""A number with its unit, or a word."""
+
+_Row = tuple[_Figure, ...]
+_Entry = TypeVar("_Entry")
+
+
+def _rows(entries: Mapping[str, _Entry], figures: Callable[[_Entry], _Row]) -> dict[str, _Row]:
+    return {name: figures(entry) for name, entry in entries.items()}
+
+
+def _motor_figures(motor: Motor) -> _Row:
+    most, lasting = (motor.rated_torque, motor.peak_torque) if motor.is_servo else (motor.holding_torque, motor.running_torque)
+    kind = "servo" if motor.is_servo else "stepper"
+    return kind, (most, "Nm"), (lasting, "Nm"), (motor.mass, "kg")
+
+
+def _gearbox_figures(gear: Gearbox) -> _Row:
+    torques = (gear.continuous_torque, gear.max_average_torque, gear.start_stop_torque, gear.peak_torque)
+    return (gear.ratio, ""), *((torque, "Nm") for torque in torques)
+
+
+def _actuator_figures(actuator: LinearActuator) -> _Row:
+    speed, lead = (None if value is None else 1e3 * value for value in (actuator.max_speed, actuator.lead))
+    return (actuator.rated_force, "N"), (actuator.peak_force, "N"), (speed, "mm/s"), (lead, "mm")
+
+
+def _spread(rows: Sequence[_Row]) -> tuple[str, ...]:
+    """Return the range of each figure of some rows, column by column, or its word."""
+    return tuple(_range([row[column] for row in rows]) for column in range(len(rows[0])))
+
+
+def _range(figures: Sequence[_Figure]) -> str:
+    words = dict.fromkeys(figure for figure in figures if isinstance(figure, str))
+    numbers = [figure for figure in figures if not isinstance(figure, str)]
+    values = [value for value, _ in numbers if value is not None]
+    if words or not values:
+        return ", ".join(words) or "-"
+    low, high = min(values), max(values)
+    span = f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}"
+    return f"{span} {numbers[0][1]}".rstrip()
+
+
+def _series(rows: Mapping[str, _Row]) -> dict[str, list[_Row]]:
+    """Return entries by series: the letters that their names begin with, and their number."""
+    groups: dict[str, dict[str, _Row]] = {}
+    for name, row in rows.items():
+        letters = "".join(takewhile(str.isalpha, name)) or name
+        groups.setdefault(letters, {})[name] = row
+    return {
+        next(iter(group)) if len(group) == 1 else f"{letters}... ({len(group)})": list(group.values())
+        for letters, group in groups.items()
+    }
 
 
 @click.command()
@@ -155,10 +207,6 @@ def _drive(boom: Boom, joint: int) -> str:
 
 def _pose(boom: Boom, name: str) -> str:
     return ", ".join(f"{joint} {_shown(i, boom.poses[name][i])}" for i, joint in enumerate(JOINTS))
-
-
-def _with(value: float | None, unit: str) -> str:
-    return "-" if value is None else f"{value:.6g} {unit}"
 
 
 def _info(boom: Boom) -> dict[str, Any]:

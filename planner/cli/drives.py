@@ -209,15 +209,16 @@ def size(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Check every drive of the catalogue on a mission; rank those without a FAIL by mass.
+    """Check the drives of the catalogue on a mission; rank those that do not fail.
 
     \b
     Example:
       boom size field-day --variant inner=5.55 --variant payload=5 --report drives.html
     """
     from boom_model import JOINTS, Catalogue
+    from boom_model.boom import IS_LENGTH
     from planner.missions.mission import check_steady, load_mission
-    from planner.sizing.choice import Adapt, choose, parse_variant, too_high
+    from planner.sizing.choice import Adapt, choose, parse_variant, too_high, untried
     from planner.sizing.tables import sizing_json, sizing_notes
 
     boom, case = load_boom(boom_file, payload), load_vehicle(vehicle)
@@ -228,14 +229,16 @@ def size(
     check_steady(case)
     work = _work(boom, asked, how, case)
     choices = choose(booms, work, joints or JOINTS, catalogue, voltages, how, payload_as, tracked("checking drives"), case)
-    notes = sizing_notes(choices, how, case, too_high(catalogue, voltages))
+    turned = any(not IS_LENGTH[JOINTS.index(joint)] for joint in joints or JOINTS)
+    left_out = untried(catalogue) if turned else ()
+    notes = sizing_notes(choices, how, case, (*too_high(catalogue, voltages), *left_out))
     written = with_names({"report": document})
     _write_sizing(files, boom, asked, choices, notes, document)
     if as_json:
         print_json(sizing_json(asked.name, choices, notes) | {"measured": list(measured_lines(boom)), "files": written})
     else:
         print_lines(None, [f"mission {asked.name}, payload {boom.payload.mass:g} kg"])
-        _print_choices(choices, notes, whole)
+        _print_choices(choices, notes, whole, left_out)
         print_lines("measured", measured_lines(boom))
         print_files(written)
         print_lines("next", [] if whole else [f"boom size {mission} --report drives.pdf"])
@@ -278,7 +281,7 @@ def _write_sizing(
         write_document(files.temporary(document), text, sizing_pictures(choices))
 
 
-def _print_choices(choices: Sequence["Choice"], notes: Sequence[str], whole: bool) -> None:
+def _print_choices(choices: Sequence["Choice"], notes: Sequence[str], whole: bool, left_out: Sequence[str]) -> None:
     """Print the conclusion and the best drive per joint, and with `whole` every drive and note."""
     from planner.sizing.tables import (
         SAVING,
@@ -295,6 +298,7 @@ def _print_choices(choices: Sequence["Choice"], notes: Sequence[str], whole: boo
     print_rows(*answer_rows(choices), drop=("fitted", "mass"))
     if not whole:
         print_lines("not checked", (f"{joints}: {reason}" for joints, reason in not_checked(choices)))
+        print_lines("not tried", left_out)
         print_lines(None, [f"{len(notes)} notes, every drive ranked: --all lists them"])
         return
     print_rows(SAVING, saving(choices))

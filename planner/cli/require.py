@@ -10,6 +10,7 @@ from planner.cli.completion import OneOf, OutFile, joints, missions
 from planner.cli.options import (
     all_option,
     boom_option,
+    given_catalogue,
     json_option,
     load_boom,
     load_vehicle,
@@ -91,12 +92,14 @@ def require(
       boom require field-day --joint yaw --tip-error 5 --picture yaw.png
       boom require field-day --current load --surplus battery --cycles 3
     """
-    from boom_model import JOINTS
+    from boom_model import JOINTS, Catalogue
     from planner.checks.energy import Current, Supply, Surplus
     from planner.checks.evaluation import at_samples
     from planner.missions.mission import cycle_energy, load_mission, plan_cycle
     from planner.reports.report import assumptions
+    from planner.sizing.choice import combinations
     from planner.sizing.day import Day
+    from planner.sizing.offer import nearest
     from planner.sizing.requirement import requirements
     from planner.sizing.requirement_tables import requirement_markdown, requirement_notes
 
@@ -118,13 +121,17 @@ def require(
     day = Day(cycle_energy(cycle, evaluation, supply), cycles, asked.plots)
     title = f"mission {asked.name}, payload {boom.payload.mass:g} kg"
     notes, assumed = requirement_notes(needs), (*asked.assumptions, *assumptions(boom, asked.jerk_limited))
-    text = requirement_markdown(f"Required of the drives: {title}", needs, day, notes, assumed)
+    catalogue = Catalogue.load().with_file(given_catalogue())
+    shown = needs if whole or document or as_json else ()
+    offers = {need.joint: nearest(need, combinations(boom, need.joint, catalogue)) for need in shown}
+    text = requirement_markdown(f"Required of the drives: {title}", needs, day, offers, notes, assumed)
     written = _write(files, needs, text, picture, document)
     if as_json:
-        _print_json(asked.name, needs, day, notes, assumed, measured_lines(boom), written)
+        said = {"notes": list(notes), "assumptions": list(assumed), "measured": list(measured_lines(boom))}
+        _print_json(asked.name, needs, day, offers, said, written)
     else:
         print_lines(None, [f"{title}: required at the joint of each drive"])
-        _print_sheet(needs, day, notes, assumed, whole)
+        _print_sheet(needs, day, offers, notes, assumed, whole)
         print_lines("measured", measured_lines(boom))
         print_files(written)
         print_lines("next", [] if whole or document else [f"boom require {mission} --report sheet.pdf"])
@@ -149,9 +156,9 @@ def _write(files: Any, needs: Any, text: str, picture: str | None, document: str
     return written
 
 
-def _print_sheet(needs: Any, day: Any, notes: Any, assumed: Any, whole: bool) -> None:
+def _print_sheet(needs: Any, day: Any, offers: Any, notes: Any, assumed: Any, whole: bool) -> None:
     from planner.checks.energy import ENERGY_HEADER, energy_cells
-    from planner.sizing.requirement_tables import SHEET, STEP_HEADER, items, sheet_rows, step_rows
+    from planner.sizing.requirement_tables import OFFER_HEADER, SHEET, items, offer_rows, sheet_rows, step_header, step_rows
 
     print_rows(SHEET, sheet_rows(needs), drop=("starts", "drive", "inertia"))
     print_lines(None, [day.energy.sentence, *day.sentences])
@@ -162,16 +169,16 @@ def _print_sheet(needs: Any, day: Any, notes: Any, assumed: Any, whole: bool) ->
     for need in needs:
         print_lines(None, [need.joint])
         print_rows(("required", "value"), items(need))
-        print_rows(STEP_HEADER, step_rows(need))
+        print_rows(step_header(need), step_rows(need))
+        print_rows(OFFER_HEADER, offer_rows(offers[need.joint]))
     print_rows(ENERGY_HEADER, map(energy_cells, day.energy.joints), drop=("friction", "largest"))
     print_lines(None, day.energy.sentences[1:])
     print_lines("note", notes)
     print_lines("assumed", assumed)
 
 
-def _print_json(name: str, needs: Any, day: Any, notes: Any, assumed: Any, measured: Any, written: dict[str, str]) -> None:
+def _print_json(name: str, needs: Any, day: Any, offers: Any, said: dict[str, Any], written: dict[str, str]) -> None:
     from planner.sizing.requirement_tables import requirement_json
 
-    sheets = [requirement_json(need) for need in needs]
-    said = {"notes": list(notes), "assumptions": list(assumed), "measured": list(measured)}
+    sheets = [requirement_json(need, offers[need.joint]) for need in needs]
     print_json({"mission": name, "joints": sheets, "energy": day.to_json(), **said, "files": written})

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from boom_model import BaseMotion, Boom, InputError, gravity_torque, inverse_dynamics, up_on_slope
+from boom_model import JOINTS, BaseMotion, Boom, InputError, gravity_torque, inverse_dynamics, up_on_slope
 from boom_model.arrays import Array, checked
 from boom_model.dynamics.equations_of_motion import mass_matrix_and_bias
 from planner.control.design import Controller, Gains, Goals, design
@@ -236,8 +236,8 @@ def simulate(
         track: iterates over the sampling periods, and may show progress.
 
     Raises:
-        InputError: there are no cases, the duration is not above 0, or a stepper has no elastic
-            joint.
+        InputError: there are no cases, the duration is not above 0, a stepper has no elastic
+            joint, or an elastic joint has a servo motor.
     """
     if not cases or not duration > 0.0:
         raise InputError(f"nothing to simulate: {len(cases)} cases for {duration:g} s")
@@ -250,6 +250,8 @@ def simulate(
     kinds = {case.controller for case in cases}
     if Controller.STEPPER in kinds and not m:
         raise InputError("a stepper needs an elastic gearbox for its simulation, and no joint is elastic")
+    if Controller.STEPPER in kinds:
+        _require_steppers(plant)
     if substeps is None:
         substeps = max(1, int(np.ceil(T / LONGEST_STEP - 1e-9)))
     count, h = int(np.ceil(duration / T - 1e-9)) + 1, T / substeps
@@ -402,6 +404,13 @@ def _base_arrays(vehicle: VehicleCase | None, t: Array) -> tuple[Array, ...] | N
     return tuple(np.broadcast_to(getattr(base, name), (t.size, 3)) for name in _BASE)
 
 
+def _require_steppers(plant: Plant) -> None:
+    for i in plant.elastic:
+        drive = plant.boom.drives[i]
+        if drive is not None and drive.motor.is_servo:
+            raise InputError(f"{JOINTS[i]}: {drive.motor.name} is a servo motor; it cannot be simulated as a stepper")
+
+
 def _stepper_figures(plant: Plant) -> tuple[Array, Array, Array, Array]:
     """Return p N [1/rad], N T_run, rotor damping and microstep, each (m,) for the elastic joints.
 
@@ -409,7 +418,7 @@ def _stepper_figures(plant: Plant) -> tuple[Array, Array, Array, Array]:
     """
     drives = [drive for i in plant.elastic if (drive := plant.boom.drives[i])]
     ratio = np.array([drive.gearbox.ratio for drive in drives])
-    step = np.array([drive.motor.step for drive in drives])
+    step = np.array([drive.motor.step or 2.0 * np.pi for drive in drives])  # a servo motor has none, and needs none
     holding = ratio * np.array([drive.motor.running_torque or 0.0 for drive in drives])
     teeth = np.pi / (2.0 * step) * ratio  # a full step is a quarter of an electrical turn
     drag = 2.0 * plant.figures.rotor_damping * np.sqrt(holding * teeth * plant.rotor[list(plant.elastic)])

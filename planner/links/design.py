@@ -391,7 +391,10 @@ def _motors(
     payload_as: PayloadAs,
     catalogue: Catalogue | None,
 ) -> list[MotorChoice]:
-    """Check every motor of the catalogue on the gearbox and supply of the joint, on all motions."""
+    """Check the steppers of the catalogue on the gearbox and supply of the joint, on all motions.
+
+    Motors without a running torque are left out, because their torque cannot be checked.
+    """
     drive = before.drives[joint]
     if drive is None:
         return []
@@ -408,7 +411,8 @@ def _motors(
         return max((row.verdict for row in rows), key=order.index), min(margins, default=None)
 
     choices = []
-    for motor in (Catalogue.load() if catalogue is None else catalogue).motors.values():
+    known = Catalogue.load() if catalogue is None else catalogue
+    for motor in (each for each in known.motors.values() if each.running_torque is not None):
         old, new = (judged(boom, replace(drive, motor=motor)) for boom in (before, after))
         choices.append(MotorChoice(motor.name, motor.mass, old[0], new[0], old[1], new[1]))
     return choices

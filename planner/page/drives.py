@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from boom_model import JOINTS, Boom, Catalogue, Drive, InputError, LinearDrive
+from boom_model import JOINTS, Basis, Boom, Catalogue, Drive, InputError, LinearDrive, Motor, Origin, Sourced, Wiring
 from boom_model.boom import IS_LENGTH
 from boom_model.words import unknown
 
@@ -54,10 +54,17 @@ def with_drive(boom: Boom, catalogue: Catalogue, joint: str, name: str, supplies
         motor=catalogue.motors[motor],
         gearbox=catalogue.gearboxes[gearbox],
         bus_voltage=voltage,
-        wiring=None if supply is None else supply.wiring,
+        wiring=_wiring(catalogue.motors[motor], supply),
         brake=None if supply is None else supply.brake,
     )
     return boom.with_drive(joint, drive)
+
+
+def _wiring(motor: Motor, supply: Drive | None) -> Sourced[Wiring] | None:
+    """Return the wiring of the supply, or the motor's only one."""
+    if Wiring.SINGLE in motor.windings:
+        return Sourced(Wiring.SINGLE, Origin(Basis.PRINTED, motor.source))
+    return None if supply is None or motor.is_servo else supply.wiring
 
 
 def supplies_of(boom: Boom) -> dict[str, Drive]:

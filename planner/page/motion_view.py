@@ -9,7 +9,6 @@ import numpy as np
 from boom_model import JOINTS
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH, LOAD_UNITS
-from boom_model.drives.drive import STEPPER_MARGIN
 from planner.page.html import block, css, lines_html, table_html, verdict_html
 from planner.page.plans import Planned
 from planner.page.pose_view import fixed
@@ -112,7 +111,7 @@ def _plane(plane: Plane, k: int) -> str:
     some = _some(len(plane.speed))
     lines = (
         (np.stack([plane.curve_speed, plane.curve], -1), css(LIGHT), "available"),
-        (np.stack([plane.curve_speed, plane.curve / (1.0 + STEPPER_MARGIN)], -1), css(LIMIT_COLOR), "with margin"),
+        (np.stack([plane.curve_speed, plane.curve / (1.0 + plane.margin)], -1), css(LIMIT_COLOR), "with margin"),
         (np.stack([plane.speed, plane.torque], -1)[some], css(plane.color), "motion"),
     )
     joint = plane.entity.rpartition("/")[2]

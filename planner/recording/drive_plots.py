@@ -6,7 +6,7 @@ import numpy as np
 
 from boom_model import JOINTS, Basis, Drive, tip_deflection
 from boom_model.arrays import Array
-from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
+from boom_model.drives.drive import available_torque, motor_torque
 from boom_model.drives.gear_compliance import SURE
 from planner.checks.kinds import CheckKind
 from planner.planning import Move
@@ -37,8 +37,9 @@ def motor_bundles(move: Move) -> Iterator[Bundle]:
         curve = available_torque(drive, drive.gearbox.ratio * motion.qd[:, i])
         if torque is not None and curve is not None:
             basis = _basis(drive)
-            names = ["torque [Nm]", f"available ({basis}) [Nm]", f"with {STEPPER_MARGIN:.0%} margin ({basis}) [Nm]"]
-            values = np.stack([np.abs(torque), curve, curve / (1.0 + STEPPER_MARGIN)], axis=-1)
+            asked = drive.motor.torque_margin
+            names = ["torque [Nm]", f"available ({basis}) [Nm]", f"with {asked:.0%} margin ({basis}) [Nm]"]
+            values = np.stack([np.abs(torque), curve, curve / (1.0 + asked)], axis=-1)
             colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, LIMIT_COLOR]
             yield Bundle(f"plots/motor/{joint}", f"{joint}, {drive.motor.name} [Nm]", names, colors, values)
 
@@ -85,7 +86,7 @@ def margin_bundles(move: Move) -> Iterator[Bundle]:
         curve = available_torque(drive, gear.ratio * motion.qd[:, i])
         if torque is not None and curve is not None:
             curves[f"motor ({_basis(drive)})"] = margin(np.abs(torque), curve)
-            required["motor, required"] = STEPPER_MARGIN
+            required["motor, required"] = drive.motor.torque_margin
         shown = [*curves.values(), *(np.full(len(tau), value) for value in required.values())]
         names = [f"{name} [%]" for name in (*curves, *required)]
         kinds = {"gearbox, start-stop": JOINT_COLORS[joint], "gearbox, momentary peak": PURPLE}

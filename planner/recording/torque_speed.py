@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 
 from boom_model import JOINTS, Basis, Drive
 from boom_model.arrays import Array
-from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
+from boom_model.drives.drive import available_torque, motor_torque
 from planner.checks.kinds import CheckKind
 from planner.planning import Move
 from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, OUTSIDE_COLOR, PAYLOAD_COLOR, PURPLE, Color
@@ -40,6 +40,8 @@ class Plane:
     curve: Array
     basis: Basis
     """Basis of the curve."""
+    margin: float
+    """Margin that the motor's torque needs."""
 
     @property
     def most(self) -> Array:
@@ -85,6 +87,7 @@ def planes(move: Move) -> Iterator[Plane]:
             curve_speed=w,
             curve=curve,
             basis=basis,
+            margin=drive.motor.torque_margin,
         )
 
 
@@ -111,9 +114,9 @@ def log_plane(recording: rr.RecordingStream, t: Array, plane: Plane) -> None:
             at = np.array(ends[0]) + ([0.0, 0.05] if axis == 0 else [-0.1, -0.04])
             _text(recording, f"{plane.entity}/grid/{unit}/{k}/value", at, f"{value:g} {unit}")
     curve = plane.points(plane.curve_speed, plane.curve)
-    with_margin = plane.points(plane.curve_speed, plane.curve / (1.0 + STEPPER_MARGIN))
+    with_margin = plane.points(plane.curve_speed, plane.curve / (1.0 + plane.margin))
     line("available", curve, PAYLOAD_COLOR, 1.2, f"available ({plane.basis})")
-    line("with_margin", with_margin, LIMIT_COLOR, 1.2, f"with {STEPPER_MARGIN:.0%} margin")
+    line("with_margin", with_margin, LIMIT_COLOR, 1.2, f"with {plane.margin:.0%} margin")
     if plane.reversed is not None:
         line("reversed", plane.points(plane.speed, plane.reversed), PURPLE, 0.8, "motion reversed")
     points = plane.points(plane.speed, plane.torque)

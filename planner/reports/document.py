@@ -181,7 +181,10 @@ def _pdf(markdown: str, drawn: Mapping[str, bytes], made: str, lead: _Lead = Non
 
 
 def _set_markdown(pdf: "FPDF", markdown: str) -> None:
-    """Set text and tables; a paragraph that begins with a verdict has its colour."""
+    """Set text and tables.
+
+    A paragraph that begins with a verdict has its colour. A thematic break begins a page.
+    """
     from markdown_it import MarkdownIt
     from markdown_it.tree import SyntaxTreeNode
 
@@ -189,6 +192,8 @@ def _set_markdown(pdf: "FPDF", markdown: str) -> None:
         if node.type == "table":
             pdf.ln(2)
             _set_table(pdf, [[_text(cell) for cell in row.children] for part in node.children for row in part.children])
+        elif node.type == "hr":
+            pdf.add_page()
         elif node.type == "heading":
             size = _TEXT + (5 if node.tag == "h1" else 3)
             pdf.ln(3)

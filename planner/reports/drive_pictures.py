@@ -9,7 +9,7 @@ import numpy as np
 
 from boom_model import JOINTS, Boom, Drive, InputError, tip_deflection
 from boom_model.arrays import Array
-from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque
+from boom_model.drives.drive import available_torque, motor_torque
 from boom_model.drives.gear_compliance import SURE
 from planner.checks.kinds import CheckKind, Part
 from planner.checks.rows import Row, Verdict
@@ -169,7 +169,8 @@ def _plane(axes: "Axes", drive: Drive, joint: str, tau: Array, qd: Array, qdd: A
             )
         )
         axes.plot(w * _RPM, curve, color=_CURVE, label=f"available (estimated{supply})")
-        axes.plot(w * _RPM, curve / (1.0 + STEPPER_MARGIN), "--", color=_CURVE, label=f"with {STEPPER_MARGIN:.0%} margin")
+        if margin := drive.motor.torque_margin:
+            axes.plot(w * _RPM, curve / (1.0 + margin), "--", color=_CURVE, label=f"with {margin:.0%} margin")
     elif running is not None:
         axes.axhline(running, color=_CURVE, linestyle=":", label="running torque (the curve needs voltage and wiring)")
     axes.set(title=f"{joint}: {drive.motor.name}", xlabel="motor speed [rpm]", ylabel="absolute motor torque [Nm]")

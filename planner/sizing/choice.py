@@ -1,6 +1,6 @@
 """Choice of motor, wiring, voltage and gearbox for a joint, checked on a mission."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import islice
@@ -13,9 +13,11 @@ from boom_model import (
     Boom,
     Catalogue,
     Drive,
+    Gearbox,
     InfeasibleError,
     InputError,
     LinearDrive,
+    Motor,
     Origin,
     Sourced,
     Wiring,
@@ -38,6 +40,7 @@ LARGEST_STRETCH = 8.0
 """Largest factor by which `Adapt.RESCALE` slows the moves of a mission."""
 
 _STRETCH_STEPS = 16
+_NAMED = 3
 _GIVEN = Origin(Basis.ASSUMED, "candidate supply")
 
 
@@ -87,6 +90,11 @@ class Judged:
         return tuple(row.check for row in self.rows if row.verdict is Verdict.NOT_CHECKABLE)
 
     @property
+    def limits_without_data(self) -> int:
+        """Number of limit checks without data."""
+        return sum(row.verdict is Verdict.NOT_CHECKABLE and row.kind.severity is Severity.LIMIT for row in self.rows)
+
+    @property
     def warned(self) -> tuple[str, ...]:
         """Checks with a warning."""
         return tuple(row.check for row in self.rows if row.verdict is Verdict.WARN)
@@ -128,9 +136,29 @@ class Judged:
 
 
 def candidates(boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[float] = ()) -> tuple[Drive | LinearDrive, ...]:
+    """Return the `combinations` of a catalogue for a joint of which the motor torque can be checked.
+
+    Motors and gearboxes whose datasheets do not give it are left out; see `untried`.
+
+    Args:
+        boom: see `combinations`.
+        joint: see `combinations`.
+        catalogue: see `combinations`.
+        voltages: see `combinations`.
+
+    Raises:
+        InputError: see `combinations`.
+    """
+    every = combinations(boom, joint, catalogue, voltages)
+    return tuple(d for d in every if isinstance(d, LinearDrive) or (_has_losses(d.gearbox) and _has_torque(d.motor)))
+
+
+def combinations(
+    boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[float] = ()
+) -> tuple[Drive | LinearDrive, ...]:
     """Return all combinations of motor, wiring, bus voltage and gearbox of a catalogue for a joint.
 
-    For the extension, return every actuator.
+    A servo motor has neither wiring nor bus voltage. For the extension, return every actuator.
 
     Args:
         boom: the boom, with its fitted drives.
@@ -149,13 +177,10 @@ def candidates(boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[
     fitted = boom.drives[i]
     supplies = _supplies(boom, fitted, voltages)
     return tuple(
-        Drive(motor, gearbox, supply, _wired(fitted, wiring), None if fitted is None else fitted.brake)
+        Drive(motor, gearbox, supply, wiring, None if fitted is None else fitted.brake)
         for gearbox in catalogue.gearboxes.values()
         for motor in catalogue.motors.values()
-        for wiring, winding in ((Wiring.PARALLEL, motor.parallel), (Wiring.SERIES, motor.series))
-        if winding is not None
-        for supply in supplies
-        if supply is None or motor.max_voltage is None or supply.value <= motor.max_voltage
+        for wiring, supply in _fed(motor, fitted, supplies)
     )
 
 
@@ -171,9 +196,9 @@ def size(
 ) -> tuple[Judged, ...]:
     """Check each drive on a joint, with the other joints' drives unchanged, and rank the results.
 
-    Drives that do not fail come first, by mass and then by margin. The mass of a drive is not added
-    to any body here. A different mass at the base does not change the torques of inner and lower; a
-    mass farther out would.
+    Drives that do not fail come first: those with the fewest limits without data, then by mass,
+    then by margin. The mass of a drive is not added to any body here. A different mass at the base
+    does not change the torques of inner and lower; a mass farther out would.
 
     Args:
         boom: the boom.
@@ -308,19 +333,45 @@ def fitted(
     return _judged(boom, work, joint, drive, _view(boom, work, joint, load))
 
 
+def untried(catalogue: Catalogue) -> tuple[str, ...]:
+    """Return a sentence for the gearboxes, and one for the motors, that `candidates` leaves out."""
+    gears = [name for name, gear in catalogue.gearboxes.items() if not _has_losses(gear)]
+    motors = [name for name, motor in catalogue.motors.items() if not _has_torque(motor)]
+    sentences = []
+    for names, kind, missing in (
+        (gears, "gearbox", "no efficiency, no-load torque or input inertia is printed"),
+        (motors, "motor", "no running torque, continuous torque or rotor inertia is printed"),
+    ):
+        if names:
+            more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+            sentences.append(f"{kind} {names[0]}{more}: {missing}, so the torque at the motor cannot be checked")
+    return tuple(sentences)
+
+
+def _has_losses(gear: Gearbox) -> bool:
+    return None not in (gear.efficiency, gear.no_load_input_torque, gear.input_inertia)
+
+
+def _has_torque(motor: Motor) -> bool:
+    lasting = motor.rated_torque if motor.is_servo else motor.running_torque
+    return None not in (lasting, motor.rotor_inertia)
+
+
 def too_high(catalogue: Catalogue, voltages: Sequence[float]) -> tuple[str, ...]:
-    """Return a sentence for each voltage that some motor does not allow."""
-    limits = {name: motor.max_voltage for name, motor in catalogue.motors.items() if motor.max_voltage is not None}
+    """Return a sentence for each voltage that some stepper motor does not allow."""
+    steppers = [motor for motor in catalogue.motors.values() if not motor.is_servo]
+    limits = {motor.name: motor.max_voltage for motor in steppers if motor.max_voltage is not None}
     sentences = []
     for voltage in dict.fromkeys(voltages):
         weak = [name for name, limit in limits.items() if voltage > limit]
         if not weak:
             continue
         most = max(limits[name] for name in weak)
-        if len(weak) == len(catalogue.motors):
-            sentences.append(f"{voltage:g} V exceeds the limit of every motor (at most {most:g} V)")
+        if len(weak) == len(steppers):
+            sentences.append(f"{voltage:g} V exceeds the limit of every stepper motor (at most {most:g} V)")
         else:
-            sentences.append(f"{voltage:g} V exceeds the limit of {', '.join(weak)}; it is not tried there")
+            more = f" and {len(weak) - _NAMED} more" if len(weak) > _NAMED else ""
+            sentences.append(f"{voltage:g} V exceeds the limit of {', '.join(weak[:_NAMED])}{more}; it is not tried there")
     return tuple(sentences)
 
 
@@ -358,6 +409,18 @@ def _supplies(boom: Boom, own: Drive | None, voltages: Sequence[float]) -> tuple
     if not voltages:
         return (known,)
     return tuple(known if known is not None and known.value == v else Sourced(v, _GIVEN) for v in voltages)
+
+
+def _fed(
+    motor: Motor, fitted: Drive | None, supplies: Sequence[Sourced[float] | None]
+) -> Iterator[tuple[Sourced[Wiring] | None, Sourced[float] | None]]:
+    """Yield each wiring and voltage to try; a servo motor's torque depends on neither."""
+    if motor.is_servo:
+        yield None, None
+    for wiring in motor.windings:
+        for supply in supplies:
+            if supply is None or motor.max_voltage is None or supply.value <= motor.max_voltage:
+                yield _wired(fitted, wiring), supply
 
 
 def _wired(own: Drive | None, wiring: Wiring) -> Sourced[Wiring]:
@@ -436,10 +499,10 @@ def spare(row: Row) -> float:
     return (1.0 + (row.margin or 0.0)) / (1.0 + row.required_margin) - 1.0
 
 
-def _rank(judged: Judged) -> tuple[bool, float, tuple[float, ...]]:
-    """Return the sorting key: failure, then mass, then the smallest `spare`, then the next.
+def _rank(judged: Judged) -> tuple[bool, int, float, tuple[float, ...]]:
+    """Return the sorting key: failure, number of limits without data, mass, `spare`.
 
     Drives with the same gearbox share its rows, so the first different row decides between them.
     """
     spares = tuple(-spare(row) for row in judged.by_spare)
-    return judged.fails, np.inf if judged.mass is None else judged.mass, spares
+    return judged.fails, judged.limits_without_data, np.inf if judged.mass is None else judged.mass, spares

@@ -12,7 +12,7 @@ from boom_model.dynamics.newton_euler import PayloadAs
 from boom_model.words import unknown
 from planner.checks.drives.gearbox import LEAST_FREQUENCY
 from planner.checks.drives.joint_view import JointView
-from planner.checks.drives.motor import INERTIA_RATIO
+from planner.checks.drives.servo import INERTIA_RATIO
 from planner.checks.evaluation import Evaluation, at_samples
 from planner.checks.motion_checks import joint_views
 from planner.missions.mission import Cycle, check_steady
@@ -104,7 +104,7 @@ class Requirement:
     """Largest static torque with Coulomb friction [Nm], for the slowest motion through the poses.
     """
     rms: float
-    """RMS torque over the cycle [Nm]."""
+    """RMS torque over the cycle [Nm]; the larger of both directions counts."""
     top_speed: float
     output_power: float
     """Largest power that the joint takes up [W]."""
@@ -225,6 +225,7 @@ def _requirement(
     duty, i = cycle.duty, view.index
     cloud = _cloud(view)
     speed = np.abs(view.qd)
+    back = view.tau - 2.0 * view.friction if view.steady else view.tau  # friction changes its sign
     moving = duty.mean((speed > (0.0 if view.is_length else _RESTS)).astype(float))
     mean_speed = duty.mean(speed)
     creep = float(np.abs(view.static).max()) + view.coulomb
@@ -246,7 +247,7 @@ def _requirement(
         moving_speed=mean_speed / moving if moving > 0.0 else 0.0,
         hold=_point(view, view.static, still=True),
         creep=creep,
-        rms=duty.mean(view.tau**2) ** 0.5,
+        rms=duty.mean(np.maximum(view.tau**2, back**2)) ** 0.5,
         top_speed=fastest,
         output_power=max(float((cloud.torque * cloud.speed).max()), 0.0),
         braking_power=max(float((-cloud.torque * cloud.speed).max()), 0.0),

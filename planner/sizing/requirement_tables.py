@@ -1,6 +1,6 @@
 """Requirement sheets as tables, Markdown and JSON."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,12 +8,13 @@ import numpy as np
 from planner.checks.energy import ENERGY_HEADER, energy_cells
 from planner.reports.markdown import section, table
 from planner.sizing.day import Day
+from planner.sizing.offer import Offer
 from planner.sizing.requirement import Point, Requirement
 
 SHEET = ("joint", "largest", "cube mean", "hold", "top speed", "power", "inertia", "starts", "drive")
 """Columns of `sheet_rows`: one row per joint."""
 
-STEP_HEADER = ("speed up to", "torque", "acceleration")
+OFFER_HEADER = ("drive of the catalogue", "not enough", "not printed")
 _RPM = 30.0 / np.pi
 _DATA_TURNING = (
     "To be printed on the datasheet: torque-speed curve or winding data with bus voltage and wiring, holding torque, rotor "
@@ -80,31 +81,66 @@ def items(need: Requirement) -> list[tuple[str, str]]:
         ("life", _life(need)),
     ]
     if not need.is_length:
-        found.append(("margin asked of the motor", f"{need.margin:.0%} over torque at speed and holding torque"))
+        found.append(("margin asked of a stepper motor", f"{need.margin:.0%} over torque at speed and holding torque"))
     return found
 
 
+def step_header(need: Requirement) -> tuple[str, ...]:
+    """Return the header of `step_rows`."""
+    return "speed up to", "force" if need.is_length else "torque", "acceleration"
+
+
 def step_rows(need: Requirement) -> list[tuple[str, ...]]:
-    """Return the torque-speed table under STEP_HEADER."""
+    """Return the torque-speed table under `step_header`."""
     unit = "m/s^2" if need.is_length else "rad/s^2"
     return [(_speed(need, step.speed), _load(need, step.torque), f"{step.acceleration:.3g} {unit}") for step in need.steps]
 
 
+def offer_rows(offers: Sequence[Offer]) -> list[tuple[str, ...]]:
+    """Return the drives that come nearest to a sheet, under OFFER_HEADER."""
+    return [
+        (offer.name, *(", ".join(each.item for each in group) or "-" for group in (offer.short, offer.unprinted)))
+        for offer in offers
+    ]
+
+
 def requirement_markdown(
-    title: str, needs: Sequence[Requirement], day: Day, notes: Sequence[str], assumed: Sequence[str]
+    title: str,
+    needs: Sequence[Requirement],
+    day: Day,
+    offers: Mapping[str, Sequence[Offer]],
+    notes: Sequence[str],
+    assumed: Sequence[str],
 ) -> str:
-    """Return the sheets for a supplier as Markdown; power and energy of fitted drives first."""
+    """Return the sheets for a supplier as Markdown; power and energy of fitted drives first.
+
+    Args:
+        title: the title.
+        needs: a sheet for each joint.
+        day: power and energy.
+        offers: the drives of the catalogue that come nearest to each sheet, by joint.
+        notes: see `requirement_notes`.
+        assumed: what is assumed.
+    """
     lines = [f"# {title}", "", *table(SHEET, sheet_rows(needs))]
     lines += ["", "## Power and energy", "", *table(ENERGY_HEADER, map(energy_cells, day.energy.joints))]
     lines += [f"\n{sentence}" for sentence in (*day.energy.sentences, *day.sentences)]
     for need in needs:
-        lines += ["", f"## {need.joint}", "", *table(("required", "value"), items(need))]
-        lines += ["", *table(STEP_HEADER, step_rows(need)), "", _DATA_LINEAR if need.is_length else _DATA_TURNING]
+        lines += ["", "---", "", f"## {need.joint}", "", *table(("required", "value"), items(need))]
+        lines += ["", *table(step_header(need), step_rows(need)), "", _DATA_LINEAR if need.is_length else _DATA_TURNING]
+    found = [(joint, *row) for joint, group in offers.items() for row in offer_rows(group)]
+    nearest = ["", "## Nearest drives of the catalogue", "", *table(("joint", *OFFER_HEADER), found)] if found else []
+    lines += ["", "---", *nearest]
     return "\n".join([*lines, *section("Notes", notes), *section("Assumed", assumed)]) + "\n"
 
 
-def requirement_json(need: Requirement) -> dict[str, Any]:
-    """Return a sheet as a JSON object, in SI; the extension's units stand in its keys."""
+def requirement_json(need: Requirement, offers: Sequence[Offer] = ()) -> dict[str, Any]:
+    """Return a sheet as a JSON object, in SI; the extension's units stand in its keys.
+
+    Args:
+        need: the sheet.
+        offers: the drives of the catalogue that come nearest to it.
+    """
     T, w, a, J, K, x = ("N", "m_s", "m_s2", "kg", "N_m", "m") if need.is_length else (
         "Nm", "rad_s", "rad_s2", "kg_m2", "Nm_rad", "rad"
     )  # fmt: skip
@@ -145,6 +181,14 @@ def requirement_json(need: Requirement) -> dict[str, Any]:
             for step in need.steps
         ],
         "hull": [{f"speed_{w}": float(v), f"{load}_{T}": float(t)} for v, t in need.cloud.hull],
+        "nearest": [
+            {
+                "drive": offer.name,
+                "not_enough": {each.item: {"asked": each.asked, "offered": each.offered} for each in offer.short},
+                "not_printed": [each.item for each in offer.unprinted],
+            }
+            for offer in offers
+        ],
     }
 
 

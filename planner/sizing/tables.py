@@ -26,7 +26,7 @@ _NO_DRIVE_WORKS = (
     "replace it first in a boom file of your own"
 )
 
-SAVING = ("boom", "joint", "fitted", "lightest without a FAIL", "saved mass")
+SAVING = ("boom", "joint", "fitted", "best without a FAIL", "saved mass")
 
 
 def ranking(choice: Choice) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -105,7 +105,7 @@ def saving(choices: Sequence[Choice]) -> list[tuple[str, ...]]:
     return rows
 
 
-ANSWER = ("boom", "joint", "fitted", "lightest that does not fail", "mass", "saves", "verdict")
+ANSWER = ("boom", "joint", "fitted", "best that does not fail", "mass", "saves", "verdict")
 """Columns of `answer_rows`."""
 
 
@@ -137,7 +137,7 @@ def conclusion(choices: Sequence[Choice]) -> tuple[str, ...]:
             total = sum(choice.saves or 0.0 for choice in spared)
             said.append(f"{total:.1f} kg can be saved on {', '.join(choice.joint for choice in spared)}")
         elif any(choice.fitted is not None for choice in parts):
-            said.append("no lighter drive does")
+            said.append("no drive of a known mass that does is lighter")
         if none:
             said.append(f"the catalogue has no drive that does for {', '.join(none)}")
         sentences.append(f"{variant}: {'; '.join(said) or 'each joint has a drive that does'}")
@@ -214,7 +214,7 @@ def sizing_notes(
     unknown = ", ".join(unknown_checks(choices))
     notes = [
         f"a margin is (limit - demand) / demand; motor torque needs a margin of {STEPPER_MARGIN:.0%}",
-        "drives are ranked by mass, then by the smallest margin beyond the required one",
+        "drives are ranked by the number of limits without data, then by mass, then by the smallest margin",
         "the power-off check is left out, because it depends on the brake; see the report of the mission",
         _ADAPT_NOTES[adapt],
         _LEVEL_GROUND if vehicle is LEVEL else vehicle.sentence,

@@ -384,7 +384,7 @@ def test_the_gearbox_is_that_of_the_datasheet_in_si():
     }
     for name, value in printed.items():
         assert getattr(gearbox, name) == pytest.approx(value, rel=ROUNDING, abs=0), name
-    absent = {"max_input_speed", "max_average_input_speed", "rated_life", "rated_input_speed"}
+    absent = {"max_input_speed", "max_average_input_speed", "rated_life", "rated_L10", "rated_input_speed", "peak_events"}
     assert {getattr(gearbox, name) for name in absent} == {None}
     assert gearbox.source.strip()
     assert {f.name for f in fields(gearbox)} == {*printed, *absent, "name", "source"}
@@ -447,6 +447,43 @@ def own_catalogue(tmp_path):
     return file
 
 
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ("", "step_deg is missing; a servo motor has rated_torque_Nm in its place"),
+        ("mass_kg = 2", "step_deg is missing"),
+        ("holding_torque_Nm = 3\nrated_torque_Nm = 2", "step_deg is missing"),
+        ("step_deg = 1.8\npeak_torque_Nm = 2", "peak_torque_Nm is for a servo motor, which has no step_deg"),
+        ("rated_torque_Nm = 3\npeak_torque_Nm = 2", "peak_torque_Nm is 2, less than rated_torque_Nm, which is 3"),
+        ("rated_torque_Nm = 3\nrated_speed_rpm = 3000\nmax_speed_rpm = 300", "max_speed_rpm is 300, less than rated_speed_rpm"),
+    ],
+)
+def test_a_motor_is_a_stepper_or_a_servo(tmp_path, lines, said):
+    file = tmp_path / "mine.toml"
+    file.write_text(f'[motors.M]\nsource = "mine"\n{lines}\n')
+    message = refusal(lambda: Catalogue.load(file))
+    assert message.startswith(f"{file}: key motors.M: ")
+    assert said in message
+
+
+def test_a_servo_and_a_single_winding_and_a_printed_L10_are_read(tmp_path, edited):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        '[motors.S]\nsource = "mine"\nrated_torque_Nm = 1\npeak_torque_Nm = 3\nrated_speed_rpm = 3000\nmax_speed_rpm = 6000\n'
+        '[motors.W]\nsource = "mine"\nstep_deg = 1.8\nsingle = { current_A = 5, resistance_ohm = 0.4, inductance_mH = 3 }\n'
+        '[gearboxes.G]\nsource = "mine"\nratio = 100\nrated_L10_h = 7000\n'
+    )
+    catalogue = Catalogue.load(file)
+    servo, stepper = catalogue.motors["S"], catalogue.motors["W"]
+    assert (servo.step, servo.rated_torque, servo.peak_torque) == (None, 1.0, 3.0)
+    assert (servo.rated_speed, servo.max_speed) == pytest.approx((100 * np.pi, 200 * np.pi), rel=ROUNDING, abs=0)
+    assert [w.value for w in stepper.windings] == ["single"]
+    assert stepper.single.inductance == pytest.approx(0.003, rel=ROUNDING, abs=0)
+    assert catalogue.gearboxes["G"].rated_L10 == 7000 * 3600.0
+    boom = Boom.load(edited(('motor = "MST342C02"', 'motor = "W"'), ('"parallel"', '"single"')), catalogue=file)
+    assert boom.drives[1].winding is boom.drives[1].motor.single
+
+
 def test_a_users_catalogue_adds_to_the_shipped_one(edited, own_catalogue):
     shipped = Catalogue.load()
     both = shipped.with_file(own_catalogue)
@@ -479,7 +516,8 @@ def test_a_users_actuator_drives_the_extension(edited, own_catalogue):
         assert getattr(drive.actuator, name) == pytest.approx(value, rel=ROUNDING, abs=0), name
     assert {f.name for f in fields(drive.actuator)} == {*expected, "name", "source"}
     assert drive.brake.value is True
-    assert "key joints.extension.actuator.model: 'SCREW' is not in catalogue.toml (none)" in refusal(lambda: Boom.load(file))
+    message = refusal(lambda: Boom.load(file))
+    assert "key joints.extension.actuator.model: 'SCREW' is not in catalogue.toml (SA0PD-BS1, " in message
 
 
 @pytest.mark.parametrize("step", ["0.09", "91", "inf", "nan"])

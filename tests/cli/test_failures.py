@@ -288,7 +288,7 @@ def test_parquet_notes_that_are_nested_deep_are_no_notes(boom, tmp_path):
             "boom: table 2-4: a check FAILs; table 3-1: a check FAILs\n",
         ),
         (
-            ("size", "table-3-1", "--joint", "inner", "--voltage", "12"),
+            ("size", "table-3-1", "--joint", "inner", "--payload", "30"),
             "boom: no drive of the catalogue is suitable for the mission: inner, as it is\n",
         ),
     ],

@@ -113,7 +113,7 @@ def test_a_mistake_is_named_in_one_line(boom, folder, monkeypatch, typed, said):
         ("plan transport phenotyping --pitch level", "note: --pitch has no effect: no target is a tip=X,Y,Z"),
         ("plan transport tip=1.4,0,1 --pitch -1.5708", "note: pitch -1.5708 is in degrees; -1.5708 rad would be -90"),
         ("ik 1.4 0 1 --pitch -0.785", "note: pitch -0.785 is in degrees; -0.785 rad would be -45"),
-        ("size table-3-1 --joint extension", "not checked: extension: the catalogue has no drive for it"),
+        ("size table-3-1 --joint inner", "not tried: gearbox CSF-20-50-2UH and 24 more: no efficiency, no-load torque"),
     ],
 )
 def test_what_is_hardly_meant_is_said(boom, typed, said):

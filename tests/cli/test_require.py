@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import pypdf
 import pytest
 from click.testing import CliRunner
 
@@ -52,3 +53,14 @@ def test_files_are_written_and_bad_input_leaves_none(tmp_path: Path):
         other = tmp_path / "other.md"
         assert boom("table-3-1", *bad, "--report", str(other))[0] == 2, bad
         assert not other.exists()
+
+
+def test_a_sheet_for_a_supplier_is_one_page_a_joint(tmp_path: Path):
+    report = tmp_path / "sheet.pdf"
+    assert boom("table-3-1", "--tip-error", "5", "--report", str(report))[0] == 0
+    pages = [page.extract_text() for page in pypdf.PdfReader(report).pages]
+    for joint, page in zip(JOINTS, pages[1:], strict=False):
+        assert page.startswith(f"{joint}\n")
+        assert "speed up to" in page
+        assert "To be printed on the datasheet" in page
+    assert pages[1 + len(JOINTS)].startswith("Nearest drives of the catalogue")

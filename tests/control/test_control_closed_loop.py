@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from boom_model import (
     BaseMotion,
     Boom,
+    Catalogue,
     Friction,
     InputError,
     forward_kinematics,
@@ -27,7 +28,7 @@ from planner.control.simulation import simulate as simulate_freely
 from planner.motion.vehicle import load_case
 from planner.timing.profile import SHORTEST
 from planner.timing.timing import Profile
-from tests.builders import main_move, plant_energy, with_running_torque
+from tests.builders import main_move, plant_energy, with_drives, with_running_torque
 from tests.oracles import mujoco_model, tree_matrix
 
 BOOM = Boom.load()
@@ -329,3 +330,13 @@ def test_nothing_to_simulate_is_said_so():
         simulate(plant, [], 1.0)
     with pytest.raises(InputError, match="no joint is elastic"):
         simulate(plant, [case(plant, Controller.STEPPER, plan(BOOM, "phenotyping", "phenotyping"))], 1.0)
+
+
+def test_a_servo_motor_is_not_simulated_as_a_stepper():
+    servo = Catalogue.load().motors["SGM7J-04A"]
+    boom = with_drives(BOOM, motor=servo, wiring=None, bus_voltage=None)
+    plant, rest = Plant.of(boom), plan(BOOM, "phenotyping", "phenotyping")
+    with pytest.raises(InputError, match="inner: SGM7J-04A is a servo motor; it cannot be simulated as a stepper"):
+        simulate(plant, [case(plant, Controller.STEPPER, rest)], 1.0)
+    run = simulate(plant, [case(plant, Controller.PID, rest)], 0.1)
+    assert np.isfinite(run.q).all()

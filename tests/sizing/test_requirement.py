@@ -29,13 +29,13 @@ from planner.checks.evaluation import at_samples
 from planner.checks.motion_checks import joint_views
 from planner.missions.mission import load_mission, plan_cycle
 from planner.motion.vehicle import load_case
-from planner.sizing.choice import candidates, size
+from planner.sizing.choice import candidates, combinations, size
 from planner.sizing.day import Day
-from planner.sizing.offer import shortfalls
+from planner.sizing.offer import nearest, shortfalls
 from planner.sizing.requirement import STEPS, requirements
 from planner.sizing.requirement_pictures import requirement_pictures
 from planner.sizing.requirement_tables import requirement_json, requirement_markdown, requirement_notes
-from tests.builders import ORIGIN, SCREW, main_move
+from tests.builders import ORIGIN, SCREW, main_move, thesis_catalogue
 
 BOOM = Boom.load()
 _VISCOUS, _COULOMB = np.array([8.0, 20.0, 15.0, 40.0, 1.0]), np.array([2.0, 9.0, 7.0, 20.0, 0.4])
@@ -146,6 +146,34 @@ def random_drive(rng, need):
     return Drive(motor, gear, voltage, Sourced(Wiring.PARALLEL, ORIGIN))
 
 
+def random_servo(rng, need):
+    """A servo motor on a random gearbox, with its figures on both sides of what is required."""
+    gear = replace(random_drive(rng, need).gearbox, max_average_input_speed=1e3, max_input_speed=1e3, rated_life=1e12)
+    gear = replace(gear, input_inertia=gear.input_inertia and 0.05 * gear.input_inertia)
+    eta, lasting = gear.efficiency or 0.7, max(need.rms, need.hold.torque)
+    rated = float(lasting / (gear.ratio * eta) * rng.uniform(0.8, 2.5))
+    motor = Motor(
+        name="S",
+        source="a test",
+        step=None,
+        max_voltage=None,
+        holding_torque=None,
+        running_torque=None,
+        mass=1.0,
+        rotor_inertia=rng.uniform(0.001, 0.1) * need.largest_reflected / gear.ratio**2,
+        parallel=None,
+        series=None,
+        microstep_accuracy=None,
+        tolerance=None,
+        rated_torque=rated,
+        peak_torque=rated * rng.uniform(1.0, 3.0),
+        rated_speed=float(gear.ratio * need.top_speed * rng.uniform(0.9, 1.5)),
+    )
+    if rng.random() < 0.1:
+        motor = replace(motor, **{rng.choice(["rated_torque", "peak_torque", "rated_speed", "rotor_inertia"]): None})
+    return Drive(motor, gear, None, None)
+
+
 def random_actuator(rng, need):
     limits = {
         "rated_force": need.mean,
@@ -175,8 +203,58 @@ def test_what_meets_the_sheet_passes_the_checks(joint, lived, needs):
     assert len(meeting) >= 0.4 * passing  # the sheet is not far stricter than the checks
 
 
+@pytest.mark.parametrize("joint", ["inner", "extension"])
+def test_the_nearest_drives_lack_least(joint, lived, needs):
+    rng, need = np.random.default_rng(5), needs[joint]
+    drives = [random_actuator(rng, need) if need.is_length else random_drive(rng, need) for _ in range(40)]
+    parts = ("actuator",) if need.is_length else ("motor", "gearbox")
+    named = [
+        replace(drive, **{part: replace(getattr(drive, part), name=f"{part} {k}") for part in parts})
+        for k, drive in enumerate(drives)
+    ]
+    found = nearest(need, [*named, *named], 40)
+    assert len({offer.name for offer in found}) == 40
+    lacking = [(len(offer.short), len(offer.unprinted)) for offer in found]
+    assert lacking == sorted(lacking)
+    assert found[0].missing == ()
+    (first,) = size(RUBBING, lived, joint, [found[0].drive])
+    assert first.verdict is Verdict.PASS
+    for offer in found:
+        assert offer.missing == shortfalls(need, offer.drive)
+        assert set(offer.short) | set(offer.unprinted) == set(offer.missing)
+    assert len(nearest(need, named)) == 3
+
+
+def test_nearest_drives_stand_in_the_report_and_in_json(needs):
+    catalogue = Catalogue.load()
+    sheets = (needs["lower"], needs["extension"])
+    offers = {need.joint: nearest(need, combinations(BOOM, need.joint, catalogue)) for need in sheets}
+    text = requirement_markdown("sheet", sheets, day(), offers, (), ())
+    assert "| joint | drive of the catalogue | not enough | not printed |" in text
+    for joint, group in offers.items():
+        for offer in group:
+            assert f"| {joint} | {offer.name} |" in text
+    told = requirement_json(sheets[1], offers["extension"])["nearest"]
+    assert [each["drive"] for each in told] == [offer.name for offer in offers["extension"]]
+    assert all("stroke" in each["not_printed"] and not each["not_enough"] for each in told)
+    assert "force | acceleration" in text[text.index("## extension") :]
+
+
+@pytest.mark.parametrize("joint", ["yaw", "inner", "lower", "wrist"])
+def test_a_servo_that_meets_the_sheet_passes_the_checks(joint, lived, needs):
+    rng = np.random.default_rng(40 + JOINTS.index(joint))
+    drives = [random_servo(rng, needs[joint]) for _ in range(250)]
+    meeting = [drive for drive in drives if not shortfalls(needs[joint], drive)]
+    judged = size(RUBBING, lived, joint, meeting)
+    assert {each.verdict for each in judged} == {Verdict.PASS}
+    passing = sum(each.verdict is Verdict.PASS for each in size(RUBBING, lived, joint, drives))
+    assert len(meeting) >= 10
+    assert 0.4 * passing <= len(meeting)
+    assert passing < 250
+
+
 def test_the_sheet_of_the_shipped_catalogue_names_what_is_not_printed(needs):
-    found = [shortfalls(needs["lower"], drive) for drive in candidates(BOOM, "lower", Catalogue.load())]
+    found = [shortfalls(needs["lower"], drive) for drive in candidates(BOOM, "lower", thesis_catalogue())]
     for missing in found:
         assert {"gearbox input speed", "gearbox average input speed"} <= {each.item for each in missing}
         assert all(each.offered is None for each in missing if each.item.endswith("input speed"))
@@ -193,6 +271,7 @@ def test_figures_of_a_sheet_are_those_of_the_motion(lived, needs):
         assert need.hold.torque == pytest.approx(np.abs(static[:, i]).max(), rel=1e-12)
         assert need.creep == pytest.approx(need.hold.torque + RUBBING.friction.coulomb[i])
         assert need.output_power >= (tau * qd).max()
+        assert need.rms >= lived.duty.mean(tau**2) ** 0.5
         assert need.inertia[1] >= mass_matrix(RUBBING, q[::50])[:, i, i].max() * (1 - 1e-3)
         assert need.starts == 3
         assert need.life_starts == pytest.approx(3 * 4000 * 3600 / lived.duty.duration)
@@ -260,7 +339,7 @@ def test_a_joint_at_rest_has_a_sheet(tmp_path):
     assert requirement_json(lower)["largest_reflected_inertia_kg_m2"] is None
     assert yaw.starts == 1
     assert not shortfalls(extension, LinearDrive(replace(SCREW, static_force=extension.hold.torque)))
-    text = requirement_markdown("sheet", (lower, extension), day(), requirement_notes((lower, extension)), ())
+    text = requirement_markdown("sheet", (lower, extension), day(), {}, requirement_notes((lower, extension)), ())
     assert "at most any" not in text
 
 
@@ -277,7 +356,7 @@ def test_bad_requests_are_refused(lived):
 
 def test_text_json_and_picture_hold_the_same_figures(needs):
     sheets = list(needs.values())
-    text = requirement_markdown("sheet", sheets, day(), requirement_notes(sheets), ())
+    text = requirement_markdown("sheet", sheets, day(), {}, requirement_notes(sheets), ())
     for need in sheets:
         found = requirement_json(need)
         assert found["joint"] == need.joint

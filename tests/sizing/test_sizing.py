@@ -21,12 +21,14 @@ from planner.sizing.choice import (
     size,
     spare,
     too_high,
+    untried,
 )
-from planner.sizing.tables import motors, outcome, ranking, saving, sizing_json, sizing_markdown, sizing_notes
-from tests.builders import SCREW, STRONG_CATALOGUE, UNDERSIZED_MISSION, planned_mission, with_drives
+from planner.sizing.pictures import sizing_pictures
+from planner.sizing.tables import conclusion, motors, outcome, ranking, saving, sizing_json, sizing_markdown, sizing_notes
+from tests.builders import SCREW, STRONG_CATALOGUE, UNDERSIZED_MISSION, planned_mission, thesis_catalogue, with_drives
 
 BOOM = Boom.load()
-CATALOGUE = Catalogue.load()
+CATALOGUE = thesis_catalogue()
 
 
 @pytest.fixture
@@ -77,13 +79,13 @@ def test_every_row_is_the_checks_own(cycle):
         assert judged.rows == rows
 
 
-def test_the_ranking_is_by_verdict_then_mass_then_spare():
+def test_the_ranking_is_by_verdict_then_what_lacks_data_then_mass_then_spare():
     for joint in ("inner", "lower", "wrist"):
         found = sized(joint=joint)
-        keys = [(j.fails, j.mass) for j in found]
+        keys = [(j.fails, j.limits_without_data, j.mass) for j in found]
         assert keys == sorted(keys)
         for one, other in pairwise(found):
-            if (one.fails, one.mass) == (other.fails, other.mass):
+            if (one.fails, one.limits_without_data, one.mass) == (other.fails, other.limits_without_data, other.mass):
                 spares = [[spare(r) for r in j.by_spare] for j in (one, other)]
                 assert spares[0] >= spares[1]
 
@@ -271,7 +273,7 @@ def test_on_a_slope_the_rows_are_those_of_the_mission_on_the_slope(adapt):
 
 def test_a_voltage_that_motors_do_not_allow_is_said(main):
     assert too_high(CATALOGUE, (80.0, 165.0)) == ()
-    assert too_high(CATALOGUE, (80.0, 200.0, 200.0)) == ("200 V exceeds the limit of every motor (at most 165 V)",)
+    assert too_high(CATALOGUE, (80.0, 200.0, 200.0)) == ("200 V exceeds the limit of every stepper motor (at most 165 V)",)
     weak = replace(CATALOGUE.motors["MST340B02"], name="WEAK", max_voltage=60.0)
     mixed = replace(CATALOGUE, motors={**CATALOGUE.motors, "WEAK": weak})
     assert too_high(mixed, (80.0,)) == ("80 V exceeds the limit of WEAK; it is not tried there",)
@@ -282,6 +284,68 @@ def test_a_voltage_that_motors_do_not_allow_is_said(main):
     assert any("inner: NOT CHECKED, no drive of the catalogue is left" in note for note in sizing_notes((none,)))
     (extension,) = choose({"x": BOOM}, main, ("extension",), CATALOGUE, (200.0,))
     assert not extension.unmet
+
+
+def test_many_motors_that_do_not_allow_a_voltage_are_counted():
+    assert too_high(Catalogue.load(), (120.0,)) == (
+        "120 V exceeds the limit of QSH8618-65-59-340, AS1060; it is not tried there",
+    )
+    assert too_high(Catalogue.load(), (150.0,)) == (
+        "150 V exceeds the limit of QSH8618-65-59-340, QSH8618-80-55-460, QSH8618-96-55-700 and 2 more; it is not tried there",
+    )
+
+
+def test_what_cannot_be_checked_is_not_tried_and_said():
+    shipped = Catalogue.load()
+    assert untried(CATALOGUE) == ()
+    gears, motors = untried(shipped)
+    assert gears.startswith("gearbox CSF-20-50-2UH and 24 more: no efficiency")
+    assert motors.startswith("motor QSH8618-65-59-340 and 5 more: no running torque")
+    found = candidates(BOOM, "inner", shipped)
+    assert {d.gearbox.name for d in found} == {name for name in shipped.gearboxes if name.startswith(("CBG", "TP0"))}
+    fed = {d.motor.name: (d.wiring, d.bus_voltage) for d in found}
+    assert {name for name, supply in fed.items() if supply == (None, None)} == {
+        name for name, motor in shipped.motors.items() if motor.is_servo
+    }
+    steppers = {name for name, motor in shipped.motors.items() if not motor.is_servo and motor.running_torque}
+    assert {name for name, supply in fed.items() if None not in supply} == steppers
+    single = replace(shipped.motors["AS1060"], running_torque=4.0, max_voltage=None)
+    (drive,) = candidates(BOOM, "inner", replace(CATALOGUE, motors={"AS1060": single}))
+    assert (drive.wiring.value, drive.winding) == (Wiring.SINGLE, single.single)
+
+
+def test_a_servo_is_judged_by_its_own_rows(cycle):
+    servo = Catalogue.load().motors["SGM7J-08A"]
+    found = candidates(BOOM, "inner", replace(CATALOGUE, motors={servo.name: servo}))
+    (judged,) = size(BOOM, cycle, "inner", found)
+    assert {r.check for r in judged.rows} >= {"servo hold", "servo torque", "servo RMS torque", "servo speed"}
+    assert judged.mass is None  # no sheet with the mass was found
+    assert [judged.verdict, judged.first_failing] == [Verdict.INCOMPLETE, None]
+
+
+def test_what_lacks_fewer_limits_comes_before_what_is_lighter(cycle):
+    """A motor of half the mass, of which no holding torque is printed."""
+    known = CATALOGUE.motors["MST341B02"]
+    lacking = replace(known, name="LACKING", mass=1.4, holding_torque=None)
+    catalogue = replace(CATALOGUE, motors={"LACKING": lacking, known.name: known})
+    first, *_ = size(BOOM, cycle, "inner", candidates(BOOM, "inner", catalogue))
+    assert first.drive.motor is known
+
+
+def test_the_picture_of_a_large_catalogue_names_the_best_drives(cycle):
+    choices = choose({"as it is": BOOM}, cycle, ("inner", "wrist"), Catalogue.load())
+    (figure,) = sizing_pictures(choices).values()
+    (legend,) = figure.legends
+    named = [text.get_text() for text in legend.get_texts()]
+    assert len(named) == 7 + len(["another drive", "as it is", "hollow"])
+    assert {choice.lightest.name for choice in choices} <= set(named)
+    figure.canvas.draw()  # a layout that does not fit is a warning, and a warning an error
+
+
+def test_a_choice_of_unknown_mass_is_not_called_heavier(main):
+    servo = Catalogue.load().motors["SGM7J-08A"]
+    choices = choose({"x": BOOM}, main, ("inner",), replace(CATALOGUE, motors={servo.name: servo}))
+    assert conclusion(choices) == ("x: no drive of a known mass that does is lighter",)
 
 
 def replace_profile(step):

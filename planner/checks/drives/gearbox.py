@@ -1,8 +1,8 @@
-"""Checks of a strain-wave gearbox against its datasheet.
+"""Checks of a strain-wave or planetary gearbox against its datasheet.
 
-The rows follow Harmonic Drive's selection procedure. It is applied to the Cone Drive CBG because
-that maker's own procedure was not found. If a datasheet does not give a figure, the row is NOT
-CHECKABLE; it never passes.
+The rows follow Harmonic Drive's selection procedure. It is also applied to other makers' gearboxes,
+because their own procedures were not found. If a datasheet does not give a figure, the row is
+NOT CHECKABLE; it never passes.
 """
 
 from collections.abc import Iterator
@@ -33,18 +33,23 @@ LEAST_FREQUENCY = 8.0
 MOMENTARY_CYCLES = 1e4
 """Load cycles allowed at the momentary peak torque; the wave generator makes two per turn."""
 
-_PROCEDURE = "Harmonic Drive's procedure applied to another maker's gearbox"
+_MAKER = "Harmonic Drive"
 
 
 def gearbox_rows(view: JointView, drive: Drive, shock: Shock | None) -> Iterator[Row]:
     """Return every gearbox row: torque, speed, life, wind-up, lost motion, resonance, power-off."""
     gear = drive.gearbox
-    procedure = Origin(Basis.PRINTED, f"{gear.source}; {_PROCEDURE}")
+    procedure = Origin(Basis.PRINTED, f"{gear.source}; {_procedure(gear)}")
     yield from _torque_rows(view, gear, shock, procedure)
     yield from _speed_rows(view, gear)
     yield from _life_row(view, gear)
     yield from _compliance_rows(view, gear)
     yield _power_off_row(view, drive)
+
+
+def _procedure(gear: Gearbox) -> str:
+    own = gear.source.startswith(_MAKER)
+    return f"{_MAKER}'s procedure" if own else f"{_MAKER}'s procedure applied to another maker's gearbox"
 
 
 def _torque_rows(view: JointView, gear: Gearbox, shock: Shock | None, procedure: Origin) -> Iterator[Row]:
@@ -71,12 +76,15 @@ def _torque_rows(view: JointView, gear: Gearbox, shock: Shock | None, procedure:
 def _events_row(view: JointView, gear: Gearbox, shock: Shock) -> Row:
     """Return the row of the number of shocks against 1e4 / (2 (n / 60) N t).
 
-    n is the joint's largest speed during the shock [rpm], N the gear ratio, t the duration.
+    n is the joint's largest speed during the shock [rpm], N the gear ratio, t the duration. Of a
+    planetary gearbox the sheet prints the number itself.
     """
     kind, speed = CheckKind.GEARBOX_MOMENTARY_PEAKS, float(np.abs(view.qd[shock.inside]).max(initial=0.0))
     turns = gear.ratio * speed / (2.0 * np.pi) * shock.duration
     allowed = MOMENTARY_CYCLES / max(2.0 * turns, 1.0)  # a shock at rest loads the teeth once
-    origin = Origin(Basis.PRINTED, f"1e4 / (2 (n / 60) N t) with {turns:.2g} turns of the input per shock; {_PROCEDURE}")
+    origin = Origin(Basis.PRINTED, f"1e4 / (2 (n / 60) N t) with {turns:.2g} turns of the input per shock; {_procedure(gear)}")
+    if gear.peak_events is not None:
+        allowed, origin = gear.peak_events, Origin(Basis.PRINTED, gear.source)
     if shock.events is None or not shock.resolved:
         why = f"the number of shocks is not given (allowed: {allowed:.0f}); {origin.source}"
         return view.unknown(kind, why=why, demand=shock.events)
@@ -96,7 +104,9 @@ def _speed_rows(view: JointView, gear: Gearbox) -> Iterator[Row]:
 
 
 def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
-    """Return the row of the life, L10 = L50 / 5 with L50 = L_n (n_N / n_av) (T_N / T_av)^3.
+    """Return the row of the life, L10 = L_n (n_N / n_av) (T_N / T_av)^3.
+
+    L_n is the printed L10, or a fifth of the printed L50.
 
     Both the average speed and the life include pauses.
     """
@@ -106,17 +116,20 @@ def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
         return
     wanted, kind = view.duty.required_life, CheckKind.GEARBOX_LIFE
     asked = None if wanted is None else wanted.value
-    printed = gear.rated_life is not None and gear.rated_input_speed is not None
-    life, rated_speed = (gear.rated_life, gear.rated_input_speed) if printed else (FAMILY_LIFE, FAMILY_INPUT_SPEED)
+    rated = rated_L10(gear)
+    printed = rated is not None and gear.rated_input_speed is not None
+    life, rated_speed = (rated, gear.rated_input_speed) if printed else (FAMILY_LIFE / L50_OVER_L10, FAMILY_INPUT_SPEED)
     L10 = None
-    if gear.continuous_torque is not None and life is not None and rated_speed is not None:
-        L10 = life * (rated_speed / speed) * (gear.continuous_torque / average) ** 3 / L50_OVER_L10
+    similar = printed or gear.peak_events is None  # a planetary gearbox wears otherwise
+    if similar and gear.continuous_torque is not None and life is not None and rated_speed is not None:
+        L10 = life * (rated_speed / speed) * (gear.continuous_torque / average) ** 3
     if L10 is None or not printed:
         figure = "" if L10 is None else f"; indicative L10 {L10 / 3600.0:,.0f} h from 35,000 h at 2000 rpm of similar gearboxes"
         why = f"{gear.source}; rated life or speed is not printed{figure}"
         yield view.unknown(kind, why=why, demand=asked, limit=L10)
         return
-    origin = Origin(Basis.PRINTED, f"{gear.source}; L10 = L50 / 5; {_PROCEDURE}")
+    from_L50 = "" if gear.rated_L10 is not None else "; L10 = L50 / 5"
+    origin = Origin(Basis.PRINTED, f"{gear.source}{from_L50}; {_procedure(gear)}")
     if wanted is None:
         yield Row(
             joint=view.joint,
@@ -133,6 +146,13 @@ def _life_row(view: JointView, gear: Gearbox) -> Iterator[Row]:
     basis = Basis.weakest([origin.basis, wanted.origin.basis])
     both = Origin(basis, f"{origin.source}; required life: {wanted.origin.source}")
     yield view.compared(kind, demand=wanted.value, limit=L10, origin=both)
+
+
+def rated_L10(gear: Gearbox) -> float | None:
+    """Return the life L10 [s] at rated torque and input speed: printed, or a fifth of L50."""
+    if gear.rated_L10 is not None:
+        return gear.rated_L10
+    return None if gear.rated_life is None else gear.rated_life / L50_OVER_L10
 
 
 def _compliance_rows(view: JointView, gear: Gearbox) -> Iterator[Row]:

@@ -1,15 +1,16 @@
-"""Checks of a hybrid stepper motor and its gearbox against the motor's datasheet."""
+"""Checks of a motor and its gearbox against the motor's datasheet; a servo motor has its own rows."""
 
 from collections.abc import Iterator
 from functools import reduce
 
 import numpy as np
 
-from boom_model import Basis, Drive, Motor, Origin, mesh_efficiency
+from boom_model import Basis, Drive, Origin, mesh_efficiency
 from boom_model.arrays import Array
 from boom_model.drives.drive import STEPPER_MARGIN, available_torque, motor_torque, speed_for_torque
 from boom_model.drives.power import copper_power, shaft_power
 from planner.checks.drives.joint_view import JointView
+from planner.checks.drives.servo import inertia_row, servo_rows, sheet, unknown_torque
 from planner.checks.kinds import CheckKind
 from planner.checks.rows import SAMPLING_SLACK, Row, Verdict
 
@@ -18,9 +19,6 @@ LOW_SPEED = 2.0 * np.pi
 
 Our own choice.
 """
-
-INERTIA_RATIO = 10.0
-"""Guideline for the reflected load inertia divided by the rotor's inertia."""
 
 RESONANCE_BAND = 0.2
 """Half width of the resonance band, as a share of the full-step resonance; our own choice."""
@@ -36,12 +34,15 @@ def motor_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     inertia ratio, resonance, and the motor's torque against the gearbox.
     """
     motor, gear = drive.motor, drive.gearbox
+    if motor.is_servo:
+        yield from servo_rows(view, drive)
+        return
     hold, at = view.peak(view.static)
-    origin = Origin(Basis.PRINTED, f"{_sheet(motor)}; without help from friction [own derivation]")
+    origin = Origin(Basis.PRINTED, f"{sheet(motor)}; without help from friction [own derivation]")
     yield view.compared(CheckKind.MOTOR_HOLD, demand=hold / gear.ratio, limit=motor.holding_torque, at=at, origin=origin)
     yield from _torque_rows(view, drive)
     yield from _power_rows(view, drive)
-    yield _inertia_row(view, drive)
+    yield inertia_row(view, drive)
     yield _resonance_row(view, drive)
     yield _overload_row(view, drive)
 
@@ -67,24 +68,20 @@ def _torque_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     yield _motor_speed_row(view, drive, reduce(np.maximum, demands))
     braked = drive.brake is not None and drive.brake.value  # a motor without a brake stays on in a pause
     driven = np.where(view.duty.powered, demands[0], 0.0) if braked else demands[0]
-    known = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; a stepper's heat depends on its current, not on its torque")
+    known = Origin(Basis.PRINTED, f"{sheet(drive.motor)}; a stepper's heat depends on its current, not on its torque")
     yield view.informative(CheckKind.MOTOR_RMS_TORQUE, figure=view.duty.mean(driven * driven) ** 0.5, origin=known)
 
 
 def _unknown_torque_rows(view: JointView, drive: Drive, directions: list[CheckKind]) -> Iterator[Row]:
     """Return the torque and speed rows of a motor whose torque cannot be computed."""
     for kind in directions:
-        yield view.unknown(kind, why=_unknown_torque(drive))
+        yield view.unknown(kind, why=unknown_torque(drive))
     yield _quasi_static_row(view, drive)
-    unknown = Origin(Basis.PRINTED, _unknown_torque(drive))
+    unknown = Origin(Basis.PRINTED, unknown_torque(drive))
     yield view.informative(CheckKind.MOTOR_TORQUE_OTHER_READING, figure=None, origin=unknown)
     fastest, at = view.peak(view.qd)
     yield view.compared(CheckKind.MOTOR_SPEED, demand=drive.gearbox.ratio * fastest, limit=None, at=at, origin=unknown)
     yield view.informative(CheckKind.MOTOR_RMS_TORQUE, figure=None, origin=unknown)
-
-
-def _unknown_torque(drive: Drive) -> str:
-    return f"{_sheet(drive.motor)}; {drive.gearbox.source}; efficiency, no-load torque or an inertia is not printed"
 
 
 def _motor_torque_row(view: JointView, drive: Drive, kind: CheckKind, torque: Array, curve: Array | None) -> Row:
@@ -95,14 +92,14 @@ def _motor_torque_row(view: JointView, drive: Drive, kind: CheckKind, torque: Ar
     motor = drive.motor
     speed = drive.gearbox.ratio * np.abs(view.qd)
     running = motor.running_torque
-    slow = Origin(Basis.PRINTED, f"{_sheet(motor)}, running torque")
+    slow = Origin(Basis.PRINTED, f"{sheet(motor)}, running torque")
     if running is None or (curve is None and (speed > LOW_SPEED).any()):
         most, at = view.peak(torque)
         if running is not None and most * (1.0 + STEPPER_MARGIN - SAMPLING_SLACK) > running:
             # no supply gives more than the running torque
             return view.compared(kind, demand=most, limit=running, at=at, origin=slow)
         unknown = Origin(
-            Basis.PRINTED, f"{_sheet(motor)}; above {LOW_SPEED * 30.0 / np.pi:.0f} rpm the check needs bus voltage and wiring"
+            Basis.PRINTED, f"{sheet(motor)}; above {LOW_SPEED * 30.0 / np.pi:.0f} rpm the check needs bus voltage and wiring"
         )
         return view.compared(kind, demand=most, limit=None, at=at, origin=unknown)
     available = np.full_like(torque, running) if curve is None else curve
@@ -132,11 +129,11 @@ def _quasi_static_row(view: JointView, drive: Drive) -> Row:
     load, at = view.peak(np.abs(view.static) + view.coulomb)
     torque, kind = motor_torque(drive, load, 1.0, 0.0), CheckKind.MOTOR_TORQUE_QUASI_STATIC
     if torque is None:
-        return view.unknown(kind, why=_unknown_torque(drive))
+        return view.unknown(kind, why=unknown_torque(drive))
     running, curve = drive.motor.running_torque, available_torque(drive, 0.0)
     limit = running if curve is None else float(curve)
     weak = running is not None and limit is not None and limit < running * (1.0 - SAMPLING_SLACK)
-    slow = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}, running torque; quasi-static motion through the poses")
+    slow = Origin(Basis.PRINTED, f"{sheet(drive.motor)}, running torque; quasi-static motion through the poses")
     origin = _curve_origin(drive, "torque at zero speed") if weak else slow
     return view.compared(kind, demand=float(torque), limit=limit, at=at, origin=origin, warn_near=weak)
 
@@ -152,7 +149,7 @@ def _other_reading_row(view: JointView, drive: Drive, torque: Array, available: 
     origin = Origin(
         Basis.ESTIMATED,
         f"if the printed efficiency includes the no-load torque: {efficiency:.3f} for the mesh alone; {drive.gearbox.source}; "
-        f"{_sheet(drive.motor)}",
+        f"{sheet(drive.motor)}",
     )
     limit = None if available is None else float(available[at])
     figure, when = float(torque[at]), float(view.t[at])
@@ -179,29 +176,21 @@ def _motor_speed_row(view: JointView, drive: Drive, torque: Array) -> Row:
 
 def _power_rows(view: JointView, drive: Drive) -> Iterator[Row]:
     """Return the rows of the winding loss at rated current and of the largest shaft power."""
-    sheet, winding = _sheet(drive.motor), drive.winding
-    loss = Origin(Basis.PRINTED, f"{sheet}; 2 I^2 R at rated current, cold winding")
+    printed, winding = sheet(drive.motor), drive.winding
+    loss = Origin(Basis.PRINTED, f"{printed}; 2 I^2 R at rated current, cold winding")
     if drive.wiring is None or winding is None:
-        loss = Origin(Basis.PRINTED, f"{sheet}; the loss in the windings needs the wiring")
+        loss = Origin(Basis.PRINTED, f"{printed}; the loss in the windings needs the wiring")
     elif drive.wiring.origin.basis is not Basis.PRINTED:
         loss = Origin(drive.wiring.origin.basis, f"{loss.source}, {drive.wiring.value} ({drive.wiring.origin.basis})")
     held = None if winding is None else float(copper_power(winding))
     yield view.informative(CheckKind.MOTOR_HOLDING_POWER, figure=held, origin=loss)
     flow = shaft_power(drive, view.tau, view.qd, view.qdd)
     if flow is None:
-        unknown = Origin(Basis.PRINTED, _unknown_torque(drive))
+        unknown = Origin(Basis.PRINTED, unknown_torque(drive))
         yield view.informative(CheckKind.MOTOR_PEAK_POWER, figure=None, origin=unknown)
         return
     peak, at = view.peak(flow.shaft)
-    yield view.informative(CheckKind.MOTOR_PEAK_POWER, figure=peak, at=at, origin=Origin(Basis.PRINTED, f"{sheet}; T N qd"))
-
-
-def _inertia_row(view: JointView, drive: Drive) -> Row:
-    rotor, load = drive.motor.rotor_inertia, float(view.inertia.max())
-    ratio = 0.0 if rotor is None else load / drive.gearbox.ratio**2 / rotor
-    guide = f"guideline; load {load:.4g} kg m^2 / N^2 divided by the rotor's inertia; {_sheet(drive.motor)}"
-    limit = None if rotor is None else INERTIA_RATIO
-    return view.compared(CheckKind.MOTOR_INERTIA_RATIO, demand=ratio, limit=limit, origin=Origin(Basis.PRINTED, guide))
+    yield view.informative(CheckKind.MOTOR_PEAK_POWER, figure=peak, at=at, origin=Origin(Basis.PRINTED, f"{printed}; T N qd"))
 
 
 def full_step_resonance(drive: Drive) -> float | None:
@@ -214,24 +203,24 @@ def full_step_resonance(drive: Drive) -> float | None:
     motor, against 450 Nm/rad).
     """
     motor, gear = drive.motor.rotor_inertia, drive.gearbox.input_inertia
-    if drive.motor.holding_torque is None or motor is None or gear is None:
+    if drive.motor.holding_torque is None or drive.motor.step is None or motor is None or gear is None:
         return None
     stiffness = 2.0 * np.pi / drive.motor.step / 4.0 * drive.motor.holding_torque
     return float(np.sqrt(stiffness / (motor + gear)) / (2.0 * np.pi))
 
 
 def _resonance_row(view: JointView, drive: Drive) -> Row:
-    frequency, kind = full_step_resonance(drive), CheckKind.MOTOR_RESONANCE_DWELL
-    if frequency is None:
-        why = Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; holding torque or an inertia is not printed")
+    frequency, step, kind = full_step_resonance(drive), drive.motor.step, CheckKind.MOTOR_RESONANCE_DWELL
+    if frequency is None or step is None:
+        why = Origin(Basis.PRINTED, f"{sheet(drive.motor)}; holding torque or an inertia is not printed")
         return view.compared(kind, demand=0.0, limit=None, origin=why)
-    speed, resonant = drive.gearbox.ratio * np.abs(view.qd), frequency * drive.motor.step
+    speed, resonant = drive.gearbox.ratio * np.abs(view.qd), frequency * step
     longest, at = longest_dwell(view.t, speed, resonant * (1.0 - RESONANCE_BAND), resonant * (1.0 + RESONANCE_BAND))
     origin = Origin(
         Basis.ESTIMATED,
         f"guideline: {RESONANCE_CYCLES:g} periods within +-{RESONANCE_BAND:.0%} of the full-step resonance, "
         f"{frequency:.0f} Hz or {resonant * 30.0 / np.pi:.1f} rpm; microsteps excite it less [own derivation]; "
-        f"{_sheet(drive.motor)}",
+        f"{sheet(drive.motor)}",
     )
     return view.compared(kind, demand=longest, limit=RESONANCE_CYCLES / frequency, at=at, origin=origin)
 
@@ -266,14 +255,14 @@ def _overload_row(view: JointView, drive: Drive) -> Row:
     """
     motor, gear, kind = drive.motor, drive.gearbox, CheckKind.MOTOR_AGAINST_GEARBOX
     if motor.running_torque is None or gear.efficiency is None or gear.start_stop_torque is None:
-        why = f"{_sheet(motor)}; {gear.source}; running torque, efficiency or start-stop torque is not printed"
+        why = f"{sheet(motor)}; {gear.source}; running torque, efficiency or start-stop torque is not printed"
         return view.unknown(kind, why=why)
     at_joint = motor.running_torque * gear.ratio * gear.efficiency
     enough = gear.start_stop_torque / (gear.ratio * gear.efficiency)
     mesh = mesh_efficiency(gear)
     if mesh is not None and gear.no_load_input_torque is not None:  # with a better mesh less motor torque is enough
         enough = min(enough, gear.start_stop_torque / (gear.ratio * mesh) + gear.no_load_input_torque)
-    said = f"{_sheet(motor)}; {gear.source}"
+    said = f"{sheet(motor)}; {gear.source}"
     if enough < motor.running_torque:
         amperes = "" if drive.winding is None else f" ({drive.winding.current * enough / motor.running_torque:.2g} A)"
         said = (
@@ -289,16 +278,11 @@ def _least_margin(limit: Array, demand: Array) -> int:
     return int(np.argmin(np.divide(limit, demand, out=ratio, where=demand > 0.0)))
 
 
-def _sheet(motor: Motor) -> str:
-    """Return the motor's source, with the tolerance of the sheet's values."""
-    return motor.source if motor.tolerance is None else f"{motor.source} (sheet values +-{motor.tolerance:.0%})"
-
-
 def _curve_origin(drive: Drive, what: str) -> Origin:
     if drive.bus_voltage is None or drive.wiring is None:
-        return Origin(Basis.PRINTED, f"{_sheet(drive.motor)}; the check needs bus voltage and wiring")
+        return Origin(Basis.PRINTED, f"{sheet(drive.motor)}; the check needs bus voltage and wiring")
     supply = (
         f"{drive.bus_voltage.value:g} V ({drive.bus_voltage.origin.basis}), {drive.wiring.value} ({drive.wiring.origin.basis})"
     )
     basis = Basis.weakest([Basis.ESTIMATED, *(origin.basis for origin in drive.supply_origins)])
-    return Origin(basis, f"{what}, estimated from {_sheet(drive.motor)} at {supply}")
+    return Origin(basis, f"{what}, estimated from {sheet(drive.motor)} at {supply}")

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from boom_model.boom import Boom
-from boom_model.drives.catalogue import Catalogue
 from boom_model.drives.drive import (
     STEPPER_MARGIN,
     Drive,
@@ -21,6 +20,7 @@ from boom_model.drives.drive import (
     speed_for_torque,
 )
 from boom_model.provenance import Basis, Origin, Sourced
+from tests.builders import thesis_catalogue
 from tests.oracles import derivative
 
 DRIVE = Boom.load().drives[1]  # MST342C02 on CBG320160, at 80 V in parallel
@@ -41,9 +41,10 @@ def random_drives(count: int, seed: int) -> list[Drive]:
     """Motors of the catalogue in either wiring, some below the voltage that drives their current at
     standstill."""
     rng = np.random.default_rng(seed)
-    motors = list(Catalogue.load().motors.values())
+    motors = list(thesis_catalogue().motors.values())
+    wirings = (Wiring.PARALLEL, Wiring.SERIES)
     return [
-        fed(replace(DRIVE, motor=motors[rng.integers(len(motors))]), rng.uniform(1.0, 165.0), list(Wiring)[rng.integers(2)])
+        fed(replace(DRIVE, motor=motors[rng.integers(len(motors))]), rng.uniform(1.0, 165.0), wirings[rng.integers(2)])
         for _ in range(count)
     ]
 
