@@ -165,7 +165,7 @@ def control(
     found = study(boom, moves, chosen, shaping, setup, tracked("simulating"))
     found = replace(found, notes=(*found.notes, *notes))
     written = with_names({"recording": out, "loops": loops, "errors": errors, "report": document})
-    _write(files, found, written)
+    _write(files, found, written, f"{move.start} to {move.goal}, payload {boom.payload.mass:g} kg")
     return _print_study(found, written, as_json, whole)
 
 
@@ -195,7 +195,7 @@ def _check_pictures(loops: str | None, errors: str | None, controllers: "Sequenc
         raise InputError("a stepper runs in open loop: it has no Bode diagram")
 
 
-def _write(files: "Outputs", study: "Study", written: dict[str, str]) -> None:
+def _write(files: "Outputs", study: "Study", written: dict[str, str], title: str) -> None:
     """Write the output files of a study, given by kind."""
     with files:
         for kind, name in written.items():
@@ -203,7 +203,7 @@ def _write(files: "Outputs", study: "Study", written: dict[str, str]) -> None:
             if kind == "recording":
                 from planner.recording import write_control_recording
 
-                write_control_recording(place, study)
+                write_control_recording(place, study, title=title)
             elif kind == "report":
                 from planner.control.picture import study_pictures
                 from planner.reports.document import write_document

@@ -11,13 +11,13 @@ from planner.checks.kinds import CheckKind
 from planner.planning import Move
 from planner.recording.palette import (
     GREEN,
-    JOINT_COLORS,
     LIMIT_COLOR,
     ORANGE,
     PAYLOAD_COLOR,
     PURPLE,
     SKY_BLUE,
     TOTAL_COLOR,
+    YELLOW,
 )
 from planner.recording.plots import Bundle
 
@@ -37,7 +37,7 @@ def motor_bundles(move: Move) -> Iterator[Bundle]:
             basis = _basis(drive)
             names = ["torque [Nm]", f"available ({basis}) [Nm]", f"with {STEPPER_MARGIN:.0%} margin ({basis}) [Nm]"]
             values = np.stack([np.abs(torque), curve, curve / (1.0 + STEPPER_MARGIN)], axis=-1)
-            colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, LIMIT_COLOR]
+            colors = [SKY_BLUE, PAYLOAD_COLOR, LIMIT_COLOR]
             yield Bundle(f"plots/motor/{joint}", f"{joint}, {drive.motor.name} [Nm]", names, colors, values)
 
 
@@ -61,7 +61,7 @@ def gearbox_bundles(move: Move) -> Iterator[Bundle]:
         names = ["torque [Nm]", *(f"{name} [Nm]" for name in known)]
         values = np.stack([tau[:, i], *(np.full(len(tau), value) for value in known.values())], axis=-1)
         kinds = {"rated": PAYLOAD_COLOR, "largest average": ORANGE, "start-stop": LIMIT_COLOR, "average of the cycle": GREEN}
-        colors = [JOINT_COLORS[joint], *(kinds[name] for name in known)]
+        colors = [SKY_BLUE, *(kinds[name] for name in known)]
         yield Bundle(f"plots/gearbox/{joint}", f"{joint}, {gear.name} [Nm]", names, colors, values)
 
 
@@ -86,8 +86,8 @@ def margin_bundles(move: Move) -> Iterator[Bundle]:
             required["motor, required"] = STEPPER_MARGIN
         shown = [*curves.values(), *(np.full(len(tau), value) for value in required.values())]
         names = [f"{name} [%]" for name in (*curves, *required)]
-        kinds = {"gearbox, start-stop": JOINT_COLORS[joint], "gearbox, momentary peak": PURPLE}
-        colors = [*(kinds.get(name, TOTAL_COLOR) for name in curves), *(LIMIT_COLOR, ORANGE)[: len(required)]]
+        kinds = {"gearbox, start-stop": SKY_BLUE, "gearbox, momentary peak": PURPLE}
+        colors = [*(kinds.get(name, TOTAL_COLOR) for name in curves), *(LIMIT_COLOR, YELLOW)[: len(required)]]
         title = f"{joint}: (limit - demand) / demand, up to {MOST_MARGIN:.0%} [%]"
         if curves:
             yield Bundle(f"plots/margin/{joint}", title, names, colors, 100.0 * np.stack(shown, axis=-1))
@@ -107,7 +107,9 @@ def tip_bundle(move: Move) -> Bundle:
     names = [f"{name} [mm]" for name in ("wind-up", "hysteresis", "backlash", "step error", "total")]
     values = np.stack(parts, axis=-1) * 1e3
     colors = [SKY_BLUE, ORANGE, GREEN, PURPLE, TOTAL_COLOR]
-    return Bundle("plots/tip/deflection", "largest tip deflection caused by the drives [mm]", names, colors, values)
+    return Bundle(
+        "plots/tip/deflection", "largest tip deflection caused by the drives [mm], no limit is given", names, colors, values
+    )
 
 
 def _basis(drive: Drive) -> Basis:

@@ -8,6 +8,7 @@ from boom_model import JOINTS, Boom, frame_transforms
 from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from planner.motion.trajectory import Trajectory
+from planner.motion.vehicle import VehicleCase
 from planner.reports.answer import JOINT_HEADER, answer
 from planner.reports.markdown import table
 from planner.reports.report import Report
@@ -35,6 +36,12 @@ def first_page(title: str, asked: str, report: Report) -> str:
     lines += [*(f"- {each}" for each in findings), ""]
     lines.append(f"{first.assumed} assumed figures and all {len(report.rows)} checks are at the end.")
     return "\n".join(lines) + "\n"
+
+
+def circumstances(boom: Boom, vehicle: VehicleCase, report: Report) -> str:
+    """Return profile, duration, payload and vehicle of a move in a line."""
+    ground = "level ground" if vehicle.is_level else vehicle.sentence
+    return f"{report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg, {ground}"
 
 
 def first_picture(boom: Boom, motion: Trajectory, tau: Array) -> "Figure":
