@@ -72,12 +72,68 @@ def _files(incomplete: str) -> list[CompletionItem]:
     return [CompletionItem(incomplete, type="file")]
 
 
+def _listed(words: Iterable[str], incomplete: str) -> list[CompletionItem]:
+    """Return the words that may stand after the last comma of a list."""
+    before, comma, last = incomplete.rpartition(",")
+    given = before.split(",")
+    return [CompletionItem(f"{before}{comma}{word}") for word in words if word.startswith(last) and word not in given]
+
+
+def any_file(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a file."""
+    return _files(incomplete)
+
+
+def pitches(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a pitch."""
+    return _items(("down", "level", "up", "free"), incomplete)
+
+
+def kinds_of_path(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the kind of a path."""
+    return _items(("joint", "line", "arc="), incomplete)
+
+
+def links(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a link that can be designed."""
+    return _items(("inner", "lower", "outer", "extension"), incomplete)
+
+
+def materials(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a material."""
+    return _items(("steel", "aluminium", "cfrp"), incomplete)
+
+
+def profiles(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a list of profiles."""
+    from planner.timing.profile import Profile
+
+    return _listed(("all", *Profile), incomplete)
+
+
+def controllers(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a list of controllers."""
+    from planner.control.design import Controller
+
+    return _listed(("all", *Controller), incomplete)
+
+
+def shapers(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a list of input shapers."""
+    from planner.control.shaping import Shaper
+
+    return _listed(("all", *Shaper), incomplete)
+
+
 def targets(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Complete a target: the poses of --boom, or the beginning of a position."""
     from boom_model import Boom
 
-    boom = Boom.load(ctx.params.get("boom_file"))
-    return _items((*boom.poses, "tip=", "q="), incomplete)
+    try:
+        poses = Boom.load(ctx.params.get("boom_file")).poses
+    except InputError:  # the command says what is wrong with the file
+        poses = {}
+    return _items((*poses, "tip=", "q="), incomplete)
 
 
 def constraints(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from boom_model import InputError
 from boom_model.plausible import OFFSET, RATE, Range
-from planner.cli.completion import OneOf, OutFile
+from planner.cli.completion import OneOf, OutFile, any_file
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -42,9 +42,9 @@ _epsg_option = click.option(
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE")
-@click.argument("joints", metavar="JOINTS.csv")
-@click.argument("triggers", metavar="TRIGGERS.csv")
+@click.argument("vehicle", metavar="VEHICLE", shell_complete=any_file)
+@click.argument("joints", metavar="JOINTS.csv", shell_complete=any_file)
+@click.argument("triggers", metavar="TRIGGERS.csv", shell_complete=any_file)
 @click.option("--rig", required=True, type=click.Path(), metavar="RIG.toml", help="What stands where on the vehicle.")
 @click.option("--plots", type=click.Path(), metavar="MAP", help="Plot map: which plot was seen, and how probably.")
 @click.option("--out", type=OutFile(".csv"), metavar="FILE.csv", help="The tags as a table.")
@@ -122,7 +122,7 @@ def geotag(
 
 
 @click.command()
-@click.argument("source", metavar="MAP")
+@click.argument("source", metavar="MAP", shell_complete=any_file)
 @click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="Write .geojson, .shp or .csv.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Draw the map.")
 @click.option("--at", "points", multiple=True, metavar="LAT,LON", help="Which plot a point is on; may be given again.")
@@ -183,7 +183,7 @@ def plots(
 
 
 @click.command()
-@click.argument("source", metavar="MAP")
+@click.argument("source", metavar="MAP", shell_complete=any_file)
 @click.option("--footprint", required=True, metavar="M,M", help="What the sensor sees: along the arm, across it.")
 @click.option(
     "--rate", type=float, default=4.0, show_default=True, callback=plausible(RATE), metavar="HZ", help="Of the sensor."

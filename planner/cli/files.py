@@ -6,7 +6,7 @@ import click
 
 from boom_model import Boom, InputError
 from boom_model.plausible import TIME, TIP_ERROR, WINDOW
-from planner.cli.completion import OutFile
+from planner.cli.completion import OutFile, any_file
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -22,7 +22,7 @@ from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json
 
 @click.command()
 @click.argument("motion", type=click.Path(), metavar="IN")
-@click.argument("out", metavar="OUT")
+@click.argument("out", metavar="OUT", shell_complete=any_file)
 def export(motion: str, out: str) -> int:
     """Convert a motion to the format given by the ending of OUT.
 
@@ -53,7 +53,7 @@ def export(motion: str, out: str) -> int:
 
 
 @click.command()
-@click.argument("out", metavar="OUT.urdf|OUT.xml")
+@click.argument("out", metavar="OUT.urdf|OUT.xml", shell_complete=any_file)
 @payload_option
 @boom_option
 def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
@@ -78,8 +78,8 @@ def export_model(out: str, payload: float | None, boom_file: str | None) -> int:
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that --offset takes -0.5
-@click.argument("planned", metavar="PLANNED")
-@click.argument("measured", metavar="MEASURED")
+@click.argument("planned", metavar="PLANNED", shell_complete=any_file)
+@click.argument("measured", metavar="MEASURED", shell_complete=any_file)
 @click.option(
     "--offset", default="0", show_default=True, metavar="S|best",
     help="Time added to the log. best fits it to the plan, which hides a delay of the drives.",

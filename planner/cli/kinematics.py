@@ -17,7 +17,7 @@ from boom_model import (
 )
 from boom_model.boom import IS_LENGTH, LOAD_UNITS, in_degrees
 from boom_model.kinematics.constraints import parse_constraint
-from planner.cli.completion import targets
+from planner.cli.completion import any_file, targets
 from planner.cli.options import (
     boom_option,
     constraint_option,
@@ -129,7 +129,12 @@ def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
 @constraint_option
 @payload_option
 @click.option(
-    "--out", default="reach.png", show_default=True, metavar="FILE.png|FILE.rrd", help="Picture or recording to write."
+    "--out",
+    shell_complete=any_file,
+    default="reach.png",
+    show_default=True,
+    metavar="FILE.png|FILE.rrd",
+    help="Picture or recording to write.",
 )
 @boom_option
 @json_option

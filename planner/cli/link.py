@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boom_model import Boom, InfeasibleError, InputError
-from planner.cli.completion import OneOf, OutFile
+from planner.cli.completion import OneOf, OutFile, any_file, links, materials
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -34,7 +34,13 @@ _Command = Callable[..., Any]
 
 _TASK_OPTIONS: tuple[Callable[[_Command], _Command], ...] = (
     click.option(
-        "--link", "name", default="inner", show_default=True, metavar="inner|lower|outer|extension", help="Link to design."
+        "--link",
+        "name",
+        shell_complete=links,
+        default="inner",
+        show_default=True,
+        metavar="inner|lower|outer|extension",
+        help="Link to design.",
     ),
     click.option(
         "--links", type=click.Path(), metavar="FILE.toml", help="File of plates and fittings; default: the shipped one."
@@ -63,6 +69,7 @@ _TASK_OPTIONS: tuple[Callable[[_Command], _Command], ...] = (
     payload_as_option,
     click.option(
         "--material",
+        shell_complete=materials,
         default="steel",
         show_default=True,
         metavar="steel|aluminium|cfrp",
@@ -126,10 +133,17 @@ def task_options(command: _Command) -> _Command:
 )
 @payload_option
 @click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording of the design.")
-@click.option("--picture", metavar="FILE.png", help="Write a picture with contour, stress, convergence, torque and mass.")
+@click.option(
+    "--picture",
+    shell_complete=any_file,
+    metavar="FILE.png",
+    help="Write a picture with contour, stress, convergence, torque and mass.",
+)
 @report_option
 @click.option("--convergence", is_flag=True, help="Add convergence studies over slices, delta-H and elements to the JSON.")
-@click.option("--contour", metavar="FILE.txt", help="Write the contour as lines of x, H/2, 0 for a CAD curve.")
+@click.option(
+    "--contour", shell_complete=any_file, metavar="FILE.txt", help="Write the contour as lines of x, H/2, 0 for a CAD curve."
+)
 @click.option(
     "--csv",
     "csv_file",
@@ -137,8 +151,10 @@ def task_options(command: _Command) -> _Command:
     metavar="FILE.csv",
     help="Write heights, sections, forces and stress at the stations.",
 )
-@click.option("--dxf", metavar="FILE.dxf", help="Write the outline of one plate in millimetres.")
-@click.option("--out-boom", metavar="FILE.toml", help="Write the boom with the new link, for `boom plan --boom`.")
+@click.option("--dxf", shell_complete=any_file, metavar="FILE.dxf", help="Write the outline of one plate in millimetres.")
+@click.option(
+    "--out-boom", shell_complete=any_file, metavar="FILE.toml", help="Write the boom with the new link, for `boom plan --boom`."
+)
 @boom_option
 @all_option
 @json_option

@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from boom_model import Boom, InfeasibleError, InputError
-from planner.cli.completion import OutFile
+from planner.cli.completion import OutFile, any_file
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -243,7 +243,13 @@ def _quickest(move: MoveWords, rows: Sequence["ProfileRow"]) -> list[str]:
 
 @click.command()
 @click.argument("motion", type=click.Path(), metavar="IN")
-@click.option("--out", required=True, metavar="OUT", help="Motion with torques to write: .csv, .parquet, .yaml or .json.")
+@click.option(
+    "--out",
+    required=True,
+    shell_complete=any_file,
+    metavar="OUT",
+    help="Motion with torques to write: .csv, .parquet, .yaml or .json.",
+)
 @payload_option
 @payload_as_option
 @boom_option

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from boom_model import Boom, InputError
 from boom_model.plausible import Range
-from planner.cli.completion import OneOf, constraints, targets, vehicles
+from planner.cli.completion import OneOf, any_file, constraints, kinds_of_path, pitches, targets, vehicles
 from planner.cli.printing import REPLACED
 from planner.move_spec import MoveSpec, MoveWords, Word
 from planner.paths.targets import TipTarget
@@ -37,7 +37,13 @@ def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any]
 
 
 _WORDS = {field.name: field for field in fields(MoveWords) if "word" in field.metadata}
-_COMPLETE = {"via": targets, "constraint": constraints, "vehicle": vehicles}
+_COMPLETE = {
+    "via": targets,
+    "constraint": constraints,
+    "vehicle": vehicles,
+    "pitch": pitches,
+    "along": kinds_of_path,
+}
 
 
 def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -> Callable[[_Command], _Command]:
@@ -128,7 +134,9 @@ report_option = click.option(
 vehicle_option = word_option("vehicle")
 pitch_option = word_option("pitch")
 constraint_option = word_option("constraint")
-picture_option = click.option("--picture", metavar="FILE.png", help="Write a page with plots of the drives.")
+picture_option = click.option(
+    "--picture", shell_complete=any_file, metavar="FILE.png", help="Write a page with plots of the drives."
+)
 
 
 def given_catalogue() -> str | None:
