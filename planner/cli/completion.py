@@ -11,8 +11,9 @@ from boom_model.words import unknown
 
 if TYPE_CHECKING:
     _Text = click.ParamType[str]
+    _Number = click.ParamType[float]
 else:
-    _Text = click.ParamType  # not generic before click 8.2
+    _Text = _Number = click.ParamType  # not generic before click 8.2
 
 
 class OneOf(_Text):
@@ -37,6 +38,23 @@ class OneOf(_Text):
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         """Return the words with this beginning."""
         return _items(self.words, incomplete)
+
+
+class Coordinate(_Number):
+    """A coordinate [m], one of three numbers apart."""
+
+    name = "float"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number.
+
+        Raises:
+            InputError: several numbers are joined by commas.
+            click.BadParameter: it is no number.
+        """
+        if isinstance(value, str) and "," in value:
+            raise InputError(f"{value}: X Y Z are three numbers apart, such as {value.strip(',').replace(',', ' ')}")
+        return float(click.FLOAT.convert(value, param, ctx))
 
 
 class OutFile(_Text):

@@ -260,7 +260,7 @@ def _code(study: "Study") -> int:
 
 def _several(what: str, text: str, known: Sequence[str]) -> list[str]:
     """Return the names of a comma-separated list, or all known names for "all"."""
-    names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",")))
+    names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     for name in names:
         if name not in known:
             raise unknown(what, name, known, "all")

@@ -181,8 +181,7 @@ def _print_dynamics(answer: dict[str, Any], logs: str, payload: float, whole: bo
         print_rows(("parameter", "value", "+-", "file"), _cells(answer["parameters"]))
         print_lines("note", answer["notes"])
     else:
-        shown = [note for note in answer["notes"] if "stamped" in note]
-        print_lines("note", shown)
+        print_lines("note", answer["warnings"])
         print_lines(None, [f"{len(answer['notes'])} notes, every parameter with its interval: --all lists them"])
     print_files(answer["files"])
     if "boom" in answer["files"]:

@@ -268,10 +268,9 @@ def _print_design(design: "LinkDesign", written: dict[str, str], whole: bool, as
         print_json(answer)
         return
     print_lines(None, [link_report.title(design)])
-    rows = link_report.rows(design)
-    checks = [row for row in rows if row[0].startswith("check:")]
+    rows, checks = link_report.rows(design), link_report.check_rows(design)
     for header, shown in (
-        (link_report.ROWS_HEADER, rows if whole else [row for row in rows if row not in checks]),
+        (link_report.ROWS_HEADER, [*rows, *checks] if whole else rows),
         (link_report.MOTORS_HEADER, link_report.motor_rows(design)),
     ):
         if shown:

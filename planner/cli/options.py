@@ -30,7 +30,7 @@ def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any]
 
     def within(_: click.Context, parameter: click.Parameter, value: Any) -> Any:
         if value is not None:
-            quantity.require(str(parameter.name).replace("_", "-"), value)
+            quantity.require(parameter.opts[0].lstrip("-"), value)
         return value
 
     return within
@@ -159,11 +159,13 @@ def load_vehicle(vehicle: str | None) -> "VehicleCase":
 
 
 def doubts(spec: MoveSpec) -> tuple[str, ...]:
-    """Return warnings: a constraint or pitch without a tip target, or a pitch in radians."""
+    """Return warnings: options that have no effect on this move, or a pitch in radians."""
     source, given = click.get_current_context().get_parameter_source, []
     if not any(isinstance(target, TipTarget) for target in spec.targets):
         given = [f"--{name} has no effect: no target is a tip=X,Y,Z" for name in ("constraint", "pitch")
                  if source(name) is ParameterSource.COMMANDLINE]  # fmt: skip
+    if source("pass_via") is ParameterSource.COMMANDLINE and not spec.via:
+        given.append("--pass-via has no effect: no --via is given")
     return (*given, *pitch_doubts(spec.pitch))
 
 

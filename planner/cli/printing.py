@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _FEW_NOTES = 3
+_FEW_FINDINGS = (2, 5)  # with fixes and notes to print, and alone
 _BETWEEN = 2  # spaces between two cells
 _SHORT = 18
 """Largest number of characters of a cell that is never folded."""
@@ -87,12 +88,18 @@ def _print_answer(report: "Report", first: "Answer", asked: str, whole: bool) ->
         drop=("at", "motor", "gearbox", "used"),
         styles=[STYLES.get(r[-1][:4]) for r in first.joints],
     )
-    for finding in first.findings:
+    least, most = _FEW_FINDINGS
+    few = max(least, most - len(report.suggestions) - min(len(report.notes), _FEW_NOTES))
+    shown = first.findings if whole or len(first.findings) == few + 1 else first.findings[:few]
+    for finding in shown:
         console.print(finding, style=STYLES.get(finding.split()[0]), highlight=False)
+    print_lines(
+        None, [f"{len(first.findings) - len(shown)} more that FAIL or WARN"] if len(shown) < len(first.findings) else []
+    )
     print_lines("possible fix", report.suggestions)
     if not whole:
-        few = len(report.notes) <= _FEW_NOTES
-        print_lines("note", report.notes if few else [f"{len(report.notes)} notes: --all lists them"])
+        told = len(report.notes) <= _FEW_NOTES
+        print_lines("note", report.notes if told else [f"{len(report.notes)} notes: --all lists them"])
         figures = f"{first.assumed} assumed figure{'' if first.assumed == 1 else 's'}"
         console.print(f"{figures}, {len(report.rows)} checks: --all lists them", highlight=False)
 

@@ -331,11 +331,11 @@ def test_quiet_prints_nothing_but_json_and_complaints(boom):
 def test_mission_checks_a_whole_cycle(boom, tmp_path):
     code, out, err = boom("mission", "field-day", "--picture", "drives.png", "--report", "day.md")
     assert (code, err) == (0, "")
-    assert sorted(os.listdir(tmp_path)) == ["day-1.png", "day-2.png", "day-3.png", "day.md", "drives.png"]
+    assert sorted(os.listdir(tmp_path)) == ["day-1.png", "day-2.png", "day-3.png", "day-4.png", "day.md", "drives.png"]
     assert "mission field day" in out
     assert "20 x to tip=-1,1.7,0.9 along line" in boom("mission", "field-day", "--all")[1]
     assert (tmp_path / "drives.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "day.md").read_text().startswith("# INCOMPLETE")
+    assert (tmp_path / "day.md").read_text().startswith("# Mission field day\n\n4615.751 s, payload 10 kg, level ground\n")
     code, out, _ = boom("mission", "field-day", "--json")
     answer = json.loads(out)
     assert answer["profile"] == "mission field day"
