@@ -165,10 +165,11 @@ def _print_compared(
     else:
         for name, report in reports.items():
             print_lines(name, (answer(report).sentence,))
-        if whole or joints:
+        if whole:
             print_rows(header, rows)
         else:
-            print_rows(("joint", *reports), loads_side_by_side(reports))
+            loads = loads_side_by_side(reports)
+            print_rows(("joint", *reports), [row for row in loads if not joints or row[0] in joints])
             print_lines(None, [f"{len(rows)} checks: --all lists them side by side"])
         print_files(written)
     failed = [f"{name}: a check FAILs" for name, report in reports.items() if report.verdict is Verdict.FAIL]

@@ -346,6 +346,11 @@ def test_missions_stand_side_by_side(boom, tmp_path):
     code, out, _ = boom("mission", "table-2-4", "table-3-1", "--joint", "inner", "--report", "both.md")
     assert code == 0
     assert "table 3-1: INCOMPLETE" in out
+    assert re.findall(r"^(yaw|inner|lower|extension|wrist|mount|tip) ", out, flags=re.MULTILINE) == ["inner"]
+    assert len(out.splitlines()) <= 24
+    listed = boom("mission", "table-2-4", "table-3-1", "--joint", "inner", "--all")[1]
+    assert "gearbox" in listed
+    assert len(listed.splitlines()) > len(out.splitlines())
     assert "table 2-4: demand of limit" in (tmp_path / "both.md").read_text()
     code, out, _ = boom("mission", "table-2-4", "table-3-1", "--json")
     assert sorted(json.loads(out)["missions"]) == ["table 2-4", "table 3-1"]
