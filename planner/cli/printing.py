@@ -119,7 +119,7 @@ def _lines(text: str, width: int) -> int:
 
 
 def _first(findings: Sequence[str], room: int, width: int) -> Sequence[str]:
-    """Return the findings that fit `room` lines, at least _FEWEST; one line is kept to count the others."""
+    """Return the findings that fit `room` lines, one of them for a count; at least _FEWEST."""
     if sum(_lines(each, width) for each in findings) <= room:
         return findings
     used = 1

@@ -128,7 +128,7 @@ def _joint_errors(study: Study, every: slice, group: _Group) -> list[Bundle]:
 
 
 def _torques(study: Study, every: slice, group: _Group) -> list[Bundle]:
-    """Return the torques, with the least of the limits that the motors have at the controllers' speeds."""
+    """Return the torques, with the least limit that a motor has at the controllers' speeds."""
     run, bundles = study.run, []
     for i, joint in enumerate(JOINTS):
         torque = run.torque[every][:, group.cases, i]

@@ -14,7 +14,7 @@ CHECK_HEADER = ("verdict", "joint", "check", "demand", "limit", "margin", "requi
 
 
 def answer_markdown(move: Move, report: Report, title: str = "") -> str:
-    """Return the lines that the command prints first: verdict, table of joints, findings, possible fixes.
+    """Return what the command prints first: verdict, joints, findings, possible fixes.
 
     Args:
         move: the move.

@@ -141,7 +141,7 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
 
 
 def _motion_tabs(move: Move) -> list[PlotTab]:
-    """Return the tabs of positions, rates, parts of the torques, power, and forces at pins and mount."""
+    """Return the tabs of positions, rates, torque parts, power, and forces at pins and mount."""
     boom, trajectory = move.boom, move.trajectory
     tabs = [
         PlotTab("Positions", joint_plots.position_plots(boom, trajectory)),

@@ -79,7 +79,7 @@ class Plot:
         return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.view_title, plot_legend=HIDDEN, axis_y=self.scale(()))
 
     def scale(self, others: Iterable[Array]) -> rrb.ScalarAxis | None:
-        """Return the range of the axis for the curve, its limits and curves of other moves; see `scale_of`."""
+        """Return the axis for the curve, its limits and other moves' curves; see `scale_of`."""
         return scale_of([self.values, *map(np.asarray, self.limits.values()), *others])
 
 
@@ -100,7 +100,7 @@ class Bundle:
 
     @property
     def legend(self) -> list[tuple[str, Color]]:
-        """Names, without their units, and colours; none for a single curve, which the title names."""
+        """Names without units, and colours; none for a single curve, which the title names."""
         names = [name.partition(" [")[0] for name in self.names]
         return list(dict.fromkeys(zip(names, self.colors, strict=True))) if len(self.names) > 1 else []
 
@@ -111,7 +111,7 @@ class Bundle:
 
 
 def scale_of(values: Sequence[Array]) -> rrb.ScalarAxis | None:
-    """Return an axis from one multiple of a power of ten to another; None where the viewer's own will do.
+    """Return an axis between multiples of a power of ten; None where the viewer's own will do.
 
     The viewer numbers powers of ten only. A range of 2 to 5 of them has one or two numbers, if the
     plot is not tall; a range that starts and ends with one has at least four.

@@ -176,7 +176,7 @@ def log_height(recording: rr.RecordingStream, boom: Boom, t: Array, tip: Array) 
 
 
 def _log_vehicle(recording: rr.RecordingStream, ground: float, label: str) -> None:
-    """Log a vehicle on wheels behind the mount, with a bracket that leaves the force on the mount in sight."""
+    """Log a vehicle on wheels behind the mount; its bracket leaves the mount's force in sight."""
     low, high = np.array([-2.7, -0.8, ground + 0.55]), np.array([-0.25, 0.8, -0.02])
     bracket = np.array([[-0.25, -0.2, -0.06], [0.2, 0.2, -0.02]])
     parts = np.array([[low, high], bracket])

@@ -64,7 +64,7 @@ def phases(move: Move) -> list[str]:
 
 
 def active_limits(move: Move) -> list[str]:
-    """Return the limit and joint that the motion is nearest to at each sample, and none below AT_LIMIT."""
+    """Return the limit that the motion is nearest to at each sample, and none below AT_LIMIT."""
     motion, limits = move.trajectory, move.boom.limits
     rates = {"velocity": motion.qd / limits.velocity, "acceleration": motion.qdd / limits.acceleration}
     if motion.qddd is not None:

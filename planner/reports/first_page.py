@@ -102,7 +102,7 @@ def _farthest(boom: Boom, q: Array) -> int:
 
 
 def _in_turn(t: Array, parts: Sequence[slice]) -> Iterator[tuple[Array, slice]]:
-    """Yield the times and the samples of each part, one after the other without the gaps between them."""
+    """Yield the times and the samples of each part, one after the other without gaps."""
     begin = 0.0
     for part in parts or [slice(0, len(t))]:
         own = t[part] - t[part][0]

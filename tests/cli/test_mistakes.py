@@ -1,4 +1,4 @@
-"""Plausible mistakes: what was typed, and the one line that comes back; it names what to type instead."""
+"""Plausible mistakes: what was typed, and the line that names what to type instead."""
 
 import numpy as np
 import pytest
