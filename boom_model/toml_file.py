@@ -23,6 +23,7 @@ class Table(BaseModel):
 
 Schema = TypeVar("Schema", bound=Table)
 
+_OF_A_BOOM = {"geometry", "bodies", "joints"}
 _LONGEST = 40  # digits or letters of a value that a message shows
 
 
@@ -78,6 +79,8 @@ def validated(name: str, data: dict[str, Any], schema: type[Schema]) -> Schema:
     try:
         return schema.model_validate(data)
     except ValidationError as error:
+        if data.keys() >= _OF_A_BOOM and not schema.model_fields.keys() >= _OF_A_BOOM:
+            raise InputError(f"{name}: this is the file of a boom; give it as --boom {name}") from None
         raise InputError(f"{name}: " + "; ".join(_sentence(e) for e in error.errors())) from None
 
 

@@ -35,7 +35,8 @@ def numbers(text: str, rest: str, count: int) -> list[float]:
     """
     parts = rest.split(",")
     if len(parts) != count:
-        raise InputError(f"{text!r} has {len(parts)} numbers; it needs {count}")
+        given = "1 number" if len(parts) == 1 else f"{len(parts)} numbers"
+        raise InputError(f"{text!r} has {given}; it needs {count}, separated by commas")
     return [number(text, part, "a number") for part in parts]
 
 

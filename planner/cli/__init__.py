@@ -84,6 +84,8 @@ class _Commands(click.Group):
                 option = text.partition("=")[0]
                 if option.startswith("--") and option not in known:
                     raise click.NoSuchOption(option, possibilities=get_close_matches(option, known, n=1))
+                if option.startswith("-") and f"-{option}" in known:  # a word of letters behind one hyphen
+                    raise click.NoSuchOption(option, possibilities=[f"-{option}"])
         return name, command, rest
 
 

@@ -8,7 +8,7 @@ import click
 from boom_model import Boom, InputError
 from boom_model.measured import measured_lines
 from boom_model.plausible import TIME, TIP_ERROR, WINDOW
-from planner.cli.completion import OutFile
+from planner.cli.completion import OutFile, any_file
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -30,7 +30,7 @@ _model = click.Path()
 
 
 @click.command(context_settings={"ignore_unknown_options": True})  # so that --offset takes -0.5
-@click.argument("motions", nargs=-1, metavar="[PLANNED] MEASURED")
+@click.argument("motions", nargs=-1, metavar="[PLANNED] MEASURED", shell_complete=any_file)
 @click.option(
     "--offset", default="0", show_default=True, metavar="S|best",
     help="Time added to the log. best fits it to the plan, which hides a delay of the drives.",

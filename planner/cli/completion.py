@@ -11,8 +11,9 @@ from boom_model.words import unknown
 
 if TYPE_CHECKING:
     _Text = click.ParamType[str]
+    _Number = click.ParamType[float]
 else:
-    _Text = click.ParamType  # not generic before click 8.2
+    _Text = _Number = click.ParamType  # not generic before click 8.2
 
 
 class OneOf(_Text):
@@ -37,6 +38,23 @@ class OneOf(_Text):
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
         """Return the words with this beginning."""
         return _items(self.words, incomplete)
+
+
+class Coordinate(_Number):
+    """A coordinate [m], one of three numbers apart."""
+
+    name = "float"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number.
+
+        Raises:
+            InputError: several numbers are joined by commas.
+            click.BadParameter: it is no number.
+        """
+        if isinstance(value, str) and "," in value:
+            raise InputError(f"{value}: X Y Z are three numbers apart, such as {value.strip(',').replace(',', ' ')}")
+        return float(click.FLOAT.convert(value, param, ctx))
 
 
 class OutFile(_Text):
@@ -72,12 +90,68 @@ def _files(incomplete: str) -> list[CompletionItem]:
     return [CompletionItem(incomplete, type="file")]
 
 
+def _listed(words: Iterable[str], incomplete: str) -> list[CompletionItem]:
+    """Return the words that may stand after the last comma of a list."""
+    before, comma, last = incomplete.rpartition(",")
+    given = before.split(",")
+    return [CompletionItem(f"{before}{comma}{word}") for word in words if word.startswith(last) and word not in given]
+
+
+def any_file(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a file."""
+    return _files(incomplete)
+
+
+def pitches(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a pitch."""
+    return _items(("down", "level", "up", "free"), incomplete)
+
+
+def kinds_of_path(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the kind of a path."""
+    return _items(("joint", "line", "arc="), incomplete)
+
+
+def links(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete the name of a link that can be designed."""
+    return _items(("inner", "lower", "outer", "extension"), incomplete)
+
+
+def materials(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a material."""
+    return _items(("steel", "aluminium", "cfrp"), incomplete)
+
+
+def profiles(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a list of profiles."""
+    from planner.timing.profile import Profile
+
+    return _listed(("all", *Profile), incomplete)
+
+
+def controllers(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a list of controllers."""
+    from planner.control.design import Controller
+
+    return _listed(("all", *Controller), incomplete)
+
+
+def shapers(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Complete a list of input shapers."""
+    from planner.control.shaping import Shaper
+
+    return _listed(("all", *Shaper), incomplete)
+
+
 def targets(ctx: click.Context, _: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Complete a target: the poses of --boom, or the beginning of a position."""
     from boom_model import Boom
 
-    boom = Boom.load(ctx.params.get("boom_file"))
-    return _items((*boom.poses, "tip=", "q="), incomplete)
+    try:
+        poses = Boom.load(ctx.params.get("boom_file")).poses
+    except InputError:  # the command says what is wrong with the file
+        poses = {}
+    return _items((*poses, "tip=", "q="), incomplete)
 
 
 def constraints(_: click.Context, __: click.Parameter, incomplete: str) -> list[CompletionItem]:

@@ -9,7 +9,7 @@ import click
 from boom_model import Boom, InputError
 from boom_model.plausible import BANDWIDTH, DAMPING, INTEGRAL, PAYLOAD_ERROR, TIP_TOLERANCE
 from boom_model.words import unknown
-from planner.cli.completion import OutFile
+from planner.cli.completion import OutFile, any_file, controllers, profiles, shapers
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -35,14 +35,20 @@ if TYPE_CHECKING:
 @click.command(context_settings={"ignore_unknown_options": True})
 @move_options("profile", "via_velocity", "average_torque", "rate")
 @click.option(
-    "--profile", "profiles", default="cubic", show_default=True, metavar="NAME,...|all", help="Profiles as in `boom plan`."
+    "--profile",
+    "profiles",
+    shell_complete=profiles,
+    default="cubic",
+    show_default=True,
+    metavar="NAME,...|all",
+    help="Profiles as in `boom plan`.",
 )
 @click.option(
-    "--controller", "controllers", default="all", show_default=True, metavar="NAME,...|all",
+    "--controller", "controllers", shell_complete=controllers, default="all", show_default=True, metavar="NAME,...|all",
     help="pd, pid, computed-torque, lqr (with integral action), stepper (open loop).",
 )  # fmt: skip
 @click.option(
-    "--shaper", "shapers", default="none", show_default=True, metavar="NAME,...|all",
+    "--shaper", "shapers", shell_complete=shapers, default="none", show_default=True, metavar="NAME,...|all",
     help="none, zv, zvd: input shapers for the lowest mode; zv lasts half a period, zvd a whole one.",
 )  # fmt: skip
 @click.option(
@@ -93,8 +99,8 @@ if TYPE_CHECKING:
     help="Replace an assumed figure of the report, such as rate_Hz or structural_damping; repeatable.",
 )  # fmt: skip
 @click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording for `boom view`.")
-@click.option("--loops", metavar="FILE.png", help="Write a picture with Bode diagrams and poles.")
-@click.option("--errors", metavar="FILE.png", help="Write a picture with the tip errors.")
+@click.option("--loops", shell_complete=any_file, metavar="FILE.png", help="Write a picture with Bode diagrams and poles.")
+@click.option("--errors", shell_complete=any_file, metavar="FILE.png", help="Write a picture with the tip errors.")
 @report_option
 @boom_option
 @all_option
@@ -165,7 +171,7 @@ def control(
     found = study(boom, moves, chosen, shaping, setup, tracked("simulating"))
     found = replace(found, notes=(*found.notes, *notes))
     written = with_names({"recording": out, "loops": loops, "errors": errors, "report": document})
-    _write(files, found, written)
+    _write(files, found, written, f"{move.start} to {move.goal}, payload {boom.payload.mass:g} kg")
     return _print_study(found, written, as_json, whole)
 
 
@@ -195,7 +201,7 @@ def _check_pictures(loops: str | None, errors: str | None, controllers: "Sequenc
         raise InputError("a stepper runs in open loop: it has no Bode diagram")
 
 
-def _write(files: "Outputs", study: "Study", written: dict[str, str]) -> None:
+def _write(files: "Outputs", study: "Study", written: dict[str, str], title: str) -> None:
     """Write the output files of a study, given by kind."""
     with files:
         for kind, name in written.items():
@@ -203,7 +209,7 @@ def _write(files: "Outputs", study: "Study", written: dict[str, str]) -> None:
             if kind == "recording":
                 from planner.recording import write_control_recording
 
-                write_control_recording(place, study)
+                write_control_recording(place, study, title=title)
             elif kind == "report":
                 from planner.control.picture import study_pictures
                 from planner.reports.document import write_document
@@ -254,7 +260,7 @@ def _code(study: "Study") -> int:
 
 def _several(what: str, text: str, known: Sequence[str]) -> list[str]:
     """Return the names of a comma-separated list, or all known names for "all"."""
-    names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",")))
+    names = list(known) if text == "all" else list(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     for name in names:
         if name not in known:
             raise unknown(what, name, known, "all")

@@ -29,6 +29,8 @@ from planner.cli.options import (
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_report, print_rows, tracked
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from planner.files import Outputs
     from planner.missions.mission import Cycle, Mission
     from planner.motion.vehicle import VehicleCase
@@ -125,15 +127,29 @@ def _write(
             for name, move in (moves.items() if "report" in written or "picture" in written else ())
         }
         if "report" in written:
-            text = first.report.to_markdown() if alone else side_by_side_markdown(reports, joints)
+            text = first.report.details() if alone else side_by_side_markdown(reports, joints)
             titled = {
                 title if alone else f"{name}: {title}": page
                 for name, shown in drawn.items()
                 for title, page in drive_pages(*shown).items()
             }
-            write_document(files.temporary(written["report"]), text, titled)
+            write_document(
+                files.temporary(written["report"]),
+                text,
+                titled,
+                _first_page(first, next(iter(cycles.values()))) if alone else None,
+            )
         if "picture" in written:
             write_drive_picture(files.temporary(written["picture"]), *next(iter(drawn.values())))
+
+
+def _first_page(move: "Move", cycle: "Cycle") -> "tuple[str, Figure]":
+    """Return text and picture of the first page of a mission's report."""
+    from planner.reports.first_page import conditions, first_page, first_picture
+
+    asked = conditions(move.boom, move.vehicle, move.report.duration)
+    picture = first_picture(move.boom, move.trajectory, move.loads.tau, cycle.moves)
+    return first_page(f"Mission {cycle.mission.name}", asked, move.report), picture
 
 
 def _print_compared(
@@ -150,10 +166,11 @@ def _print_compared(
     else:
         for name, report in reports.items():
             print_lines(name, (answer(report).sentence,))
-        if whole or joints:
+        if whole:
             print_rows(header, rows)
         else:
-            print_rows(("joint", *reports), loads_side_by_side(reports))
+            loads = loads_side_by_side(reports)
+            print_rows(("joint", *reports), [row for row in loads if not joints or row[0] in joints])
             print_lines(None, [f"{len(rows)} checks: --all lists them side by side"])
         print_files(written)
     failed = [f"{name}: a check FAILs" for name, report in reports.items() if report.verdict is Verdict.FAIL]

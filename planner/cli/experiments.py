@@ -132,7 +132,7 @@ def _print_calibration(found: "Calibrated", check: "Check | None", measured: str
     else:
         print_lines("fitted too", [", ".join(p.name for p in fitted if p.name in answer.DETAILS) or "nothing"])
         print_lines("held as they were", [f"{', '.join(p.name for p in held) or 'none'} (--all says why)"])
-    print_lines("note", found.notes if whole else [note for note in found.notes if not note.startswith("the intervals")])
+    print_lines("note", [*(found.interval_notes if whole else ()), *found.notes])
     print_files(written)
     name = written.get("boom")
     print_lines("next", [f"boom info --boom {name}" if name else f"boom calibrate {measured} --out mine.toml"])

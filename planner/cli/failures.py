@@ -31,7 +31,7 @@ def _meaning(error: BaseException) -> tuple[int, str]:
     if isinstance(error, BoomError):
         return BAD_INPUT, str(error)
     if isinstance(error, click.ClickException):
-        return BAD_INPUT, error.format_message()
+        return BAD_INPUT, f"{error.format_message().rstrip('.')}{_usage(error)}"
     if isinstance(error, click.Abort | KeyboardInterrupt):
         return INTERRUPTED, "interrupted"
     if isinstance(error, MemoryError | OverflowError | RecursionError | FloatingPointError | RuntimeWarning):
@@ -41,6 +41,17 @@ def _meaning(error: BaseException) -> tuple[int, str]:
     return INTERNAL_ERROR, (
         f"internal error: {type(error).__name__}: {error}; please report it with the command and its output with {DEBUG}=1"
     )
+
+
+def _usage(error: click.ClickException) -> str:
+    """Return how a command is called, after an argument too few or too many."""
+    if type(error) not in (click.MissingParameter, click.UsageError) or error.ctx is None:  # type: ignore[attr-defined]
+        return ""
+    context: click.Context = error.ctx  # type: ignore[attr-defined]
+    words = [word for word in context.command.collect_usage_pieces(context) if word != "[OPTIONS]"]
+    options = [each for each in context.command.params if isinstance(each, click.Option) and each.required]
+    needed = [f"{each.opts[0]} {each.metavar or ''}" for each in options]
+    return f"; it is called as {' '.join([context.command_path, *words, *needed])}"
 
 
 def _refused(error: OSError) -> str:

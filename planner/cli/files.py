@@ -3,6 +3,7 @@
 import click
 
 from boom_model import Boom
+from planner.cli.completion import any_file
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -16,7 +17,7 @@ from planner.cli.printing import ANSWER_IS_NO, complain, print_json, print_lines
 
 @click.command()
 @click.argument("motion", type=click.Path(), metavar="IN")
-@click.argument("out", metavar="OUT")
+@click.argument("out", metavar="OUT", shell_complete=any_file)
 def export(motion: str, out: str) -> int:
     """Convert a motion to the format given by the ending of OUT.
 
@@ -47,7 +48,7 @@ def export(motion: str, out: str) -> int:
 
 
 @click.command()
-@click.argument("out", metavar="OUT.urdf|OUT.xml")
+@click.argument("out", metavar="OUT.urdf|OUT.xml", shell_complete=any_file)
 @payload_option
 @boom_option
 def export_model(out: str, payload: float | None, boom_file: str | None) -> int:

@@ -6,7 +6,7 @@ import click
 import numpy as np
 
 from boom_model.plausible import OFFSET, Range
-from planner.cli.completion import OutFile
+from planner.cli.completion import OutFile, any_file
 from planner.cli.options import (
     EPSG,
     all_option,
@@ -40,9 +40,9 @@ _gap_option = figure_option("--gap", _GAP, "S", "Longest gap to bridge; default:
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE")
-@click.argument("joints", metavar="JOINTS.csv")
-@click.argument("triggers", metavar="TRIGGERS.csv")
+@click.argument("vehicle", metavar="VEHICLE", shell_complete=any_file)
+@click.argument("joints", metavar="JOINTS.csv", shell_complete=any_file)
+@click.argument("triggers", metavar="TRIGGERS.csv", shell_complete=any_file)
 @_rig_option
 @click.option("--plots", type=click.Path(), metavar="MAP", help="Plot map: which plot was seen, and how probably.")
 @click.option("--out", type=OutFile(".csv", ".parquet"), metavar="FILE.csv|.parquet", help="The tags; .parquet is GeoParquet.")
@@ -128,8 +128,8 @@ def geotag(
 
 
 @click.command()
-@click.argument("vehicle", metavar="VEHICLE")
-@click.argument("points", metavar="POINTS")
+@click.argument("vehicle", metavar="VEHICLE", shell_complete=any_file)
+@click.argument("points", metavar="POINTS", shell_complete=any_file)
 @_rig_option
 @click.option("--joints", type=click.Path(), metavar="JOINTS.csv", help="Joint log, if the point is the sensor.")
 @click.option(

@@ -10,7 +10,7 @@ import numpy as np
 from boom_model import JOINTS, Boom, InputError
 from boom_model.boom import IS_LENGTH, in_degrees
 from boom_model.plausible import Range
-from planner.cli.completion import OneOf, OutFile
+from planner.cli.completion import OneOf, OutFile, any_file
 from planner.cli.options import all_option, boom_option, json_option, load_boom, outputs, payload_option, plausible
 from planner.cli.printing import (
     ANSWER_IS_NO,
@@ -33,7 +33,7 @@ _SURE = 1.96
 
 
 @click.command()
-@click.argument("logs", metavar="LOG...", nargs=-1)
+@click.argument("logs", metavar="LOG...", shell_complete=any_file, nargs=-1)
 @click.option("--design", is_flag=True, help="Write the motion worth measuring instead; takes a minute.")
 @click.option("--payload-only", is_flag=True, help="Find the payload's mass and centre of mass alone, from a short move.")
 @click.option(
@@ -181,8 +181,7 @@ def _print_dynamics(answer: dict[str, Any], logs: str, payload: float, whole: bo
         print_rows(("parameter", "value", "+-", "file"), _cells(answer["parameters"]))
         print_lines("note", answer["notes"])
     else:
-        shown = [note for note in answer["notes"] if "stamped" in note or "unexplained" in note]
-        print_lines("note", shown)
+        print_lines("note", answer["warnings"])
         print_lines(None, [f"{len(answer['notes'])} notes, every parameter with its interval: --all lists them"])
     print_files(answer["files"])
     if "boom" in answer["files"]:

@@ -18,7 +18,7 @@ from boom_model import (
 )
 from boom_model.boom import IS_LENGTH, LOAD_UNITS, in_degrees
 from boom_model.kinematics.constraints import parse_constraint
-from planner.cli.completion import targets
+from planner.cli.completion import Coordinate, any_file, targets
 from planner.cli.options import (
     boom_option,
     constraint_option,
@@ -38,9 +38,9 @@ if TYPE_CHECKING:
 
 
 @click.command(context_settings={"ignore_unknown_options": True})
-@click.argument("x", type=float)
-@click.argument("y", type=float)
-@click.argument("z", type=float)
+@click.argument("x", type=Coordinate())
+@click.argument("y", type=Coordinate())
+@click.argument("z", type=Coordinate())
 @pitch_option
 @constraint_option
 @payload_option
@@ -136,7 +136,12 @@ def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
 @constraint_option
 @payload_option
 @click.option(
-    "--out", default="reach.png", show_default=True, metavar="FILE.png|FILE.rrd", help="Picture or recording to write."
+    "--out",
+    shell_complete=any_file,
+    default="reach.png",
+    show_default=True,
+    metavar="FILE.png|FILE.rrd",
+    help="Picture or recording to write.",
 )
 @boom_option
 @json_option

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from boom_model import Boom, InfeasibleError, InputError
-from planner.cli.completion import OutFile
+from planner.cli.completion import OutFile, any_file, links, materials
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from planner.motion.trajectory import Trajectory
 
 _Command = Callable[..., Any]
+_COMPLETE = {"link": links, "material": materials}
 
 
 def task_options(command: _Command) -> _Command:
@@ -43,7 +44,8 @@ def task_options(command: _Command) -> _Command:
 
     decorated: _Command = payload_as_option(run)
     for name, option in reversed(OPTIONS.items()):
-        decorated = described_option(name, option, getattr(LinkTask, name))(decorated)
+        completes = _COMPLETE.get(name)
+        decorated = described_option(name, option, getattr(LinkTask, name), shell_complete=completes)(decorated)
     return decorated
 
 
@@ -60,10 +62,17 @@ def task_options(command: _Command) -> _Command:
 )
 @payload_option
 @click.option("--out", type=OutFile(".rrd"), metavar="FILE.rrd", help="Write a recording of the design.")
-@click.option("--picture", metavar="FILE.png", help="Write a picture with contour, stress, convergence, torque and mass.")
+@click.option(
+    "--picture",
+    shell_complete=any_file,
+    metavar="FILE.png",
+    help="Write a picture with contour, stress, convergence, torque and mass.",
+)
 @report_option
 @click.option("--convergence", is_flag=True, help="Add convergence studies over slices, delta-H and elements to the JSON.")
-@click.option("--contour", metavar="FILE.txt", help="Write the contour as lines of x, H/2, 0 for a CAD curve.")
+@click.option(
+    "--contour", shell_complete=any_file, metavar="FILE.txt", help="Write the contour as lines of x, H/2, 0 for a CAD curve."
+)
 @click.option(
     "--csv",
     "csv_file",
@@ -71,8 +80,10 @@ def task_options(command: _Command) -> _Command:
     metavar="FILE.csv",
     help="Write heights, sections, forces and stress at the stations.",
 )
-@click.option("--dxf", metavar="FILE.dxf", help="Write the outline of one plate in millimetres.")
-@click.option("--out-boom", metavar="FILE.toml", help="Write the boom with the new link, for `boom plan --boom`.")
+@click.option("--dxf", shell_complete=any_file, metavar="FILE.dxf", help="Write the outline of one plate in millimetres.")
+@click.option(
+    "--out-boom", shell_complete=any_file, metavar="FILE.toml", help="Write the boom with the new link, for `boom plan --boom`."
+)
 @boom_option
 @all_option
 @json_option
@@ -186,10 +197,9 @@ def _print_design(design: "LinkDesign", written: dict[str, str], whole: bool, as
         print_json(answer)
         return
     print_lines(None, [link_report.title(design)])
-    rows = link_report.rows(design)
-    checks = [row for row in rows if row[0].startswith("check:")]
+    rows, checks = link_report.rows(design), link_report.check_rows(design)
     for header, shown in (
-        (link_report.ROWS_HEADER, rows if whole else [row for row in rows if row not in checks]),
+        (link_report.ROWS_HEADER, [*rows, *checks] if whole else rows),
         (link_report.MOTORS_HEADER, link_report.motor_rows(design)),
     ):
         if shown:

@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from boom_model import Boom, InfeasibleError, InputError
-from planner.cli.completion import OutFile
+from planner.cli.completion import OutFile, any_file
 from planner.cli.options import (
     all_option,
     boom_option,
@@ -158,7 +158,7 @@ def _write(
         if recording is not None:
             from planner.recording import write_recording
 
-            write_recording(files.temporary(recording), move, reach=_workspace(move.boom, workspace))
+            write_recording(files.temporary(recording), move, reach=_workspace(move.boom, workspace), title=title)
         if csv_file is not None:
             write_csv(move.trajectory, files.temporary(csv_file), move.loads.tau)
         if picture is not None:
@@ -168,18 +168,13 @@ def _write(
         if document is not None:
             from planner.reports.document import write_document
             from planner.reports.drive_pictures import drive_pages
-            from planner.reports.first_page import first_page, first_picture
+            from planner.reports.first_page import circumstances, first_page, first_picture
             from planner.reports.move_pictures import move_pictures
 
             pages = move_pictures(*shown, move.loads.tau) | drive_pages(*shown, move.loads.tau, report)
-            first = first_page(title, _circumstances(move, report), report), first_picture(*shown, move.loads.tau)
+            asked = circumstances(move.boom, move.vehicle, report)
+            first = first_page(title, asked, report), first_picture(*shown, move.loads.tau)
             write_document(files.temporary(document), report.details(), pages, first)
-
-
-def _circumstances(move: "Move", report: "Report") -> str:
-    """Return profile, duration, payload and vehicle of a move in a line."""
-    vehicle = "level ground" if move.vehicle.is_level else move.vehicle.sentence
-    return f"{report.profile}, {report.duration:.3f} s, payload {move.boom.payload.mass:g} kg, {vehicle}"
 
 
 def _workspace(boom: Boom, spec: MoveSpec | None) -> Any:
@@ -213,7 +208,9 @@ def profiles(move: MoveWords, payload: float | None, out: str | None, boom_file:
         from planner.recording import write_moves_recording
 
         with files:
-            write_moves_recording(files.temporary(out), moves, profile_markdown(rows))
+            title = f"{move.start} to {move.goal}, payload {boom.payload.mass:g} kg"
+            reading = f"Each ratio is demand / limit.\n\n{profile_markdown(rows)}"
+            write_moves_recording(files.temporary(out), moves, reading, title)
     failed = [f"{row.profile}: a check FAILs" for row in rows if row.verdict == "FAIL"]
     failed += [f"{name}: {reason}" for name, reason in refused.items()]
     if as_json:
@@ -246,7 +243,13 @@ def _quickest(move: MoveWords, rows: Sequence["ProfileRow"]) -> list[str]:
 
 @click.command()
 @click.argument("motion", type=click.Path(), metavar="IN")
-@click.option("--out", required=True, metavar="OUT", help="Motion with torques to write: .csv, .parquet, .yaml or .json.")
+@click.option(
+    "--out",
+    required=True,
+    shell_complete=any_file,
+    metavar="OUT",
+    help="Motion with torques to write: .csv, .parquet, .yaml or .json.",
+)
 @payload_option
 @payload_as_option
 @boom_option

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from boom_model import Boom, InputError
 from boom_model.plausible import Range
-from planner.cli.completion import OneOf, constraints, targets, vehicles
+from planner.cli.completion import OneOf, any_file, constraints, kinds_of_path, pitches, targets, vehicles
 from planner.cli.printing import REPLACED
 from planner.move_spec import MoveSpec, MoveWords
 from planner.option_field import OptionField, options_of
@@ -31,14 +31,20 @@ def plausible(quantity: Range) -> Callable[[click.Context, click.Parameter, Any]
 
     def within(_: click.Context, parameter: click.Parameter, value: Any) -> Any:
         if value is not None:
-            quantity.require(str(parameter.name).replace("_", "-"), value)
+            quantity.require(parameter.opts[0].lstrip("-"), value)
         return value
 
     return within
 
 
 _WORDS = options_of(MoveWords)
-_COMPLETE = {"via": targets, "constraint": constraints, "vehicle": vehicles}
+_COMPLETE = {
+    "via": targets,
+    "constraint": constraints,
+    "vehicle": vehicles,
+    "pitch": pitches,
+    "along": kinds_of_path,
+}
 
 
 def word_option(name: str, *, default: Any = MISSING, help: str | None = None) -> Callable[[_Command], _Command]:
@@ -170,7 +176,9 @@ report_option = click.option(
 vehicle_option = word_option("vehicle")
 pitch_option = word_option("pitch")
 constraint_option = word_option("constraint")
-picture_option = click.option("--picture", metavar="FILE.png", help="Write a page with plots of the drives.")
+picture_option = click.option(
+    "--picture", shell_complete=any_file, metavar="FILE.png", help="Write a page with plots of the drives."
+)
 
 
 def given_catalogue() -> str | None:
@@ -193,11 +201,13 @@ def load_vehicle(vehicle: str | None) -> "VehicleCase":
 
 
 def doubts(spec: MoveSpec) -> tuple[str, ...]:
-    """Return warnings: a constraint or pitch without a tip target, or a pitch in radians."""
+    """Return warnings: options that have no effect on this move, or a pitch in radians."""
     source, given = click.get_current_context().get_parameter_source, []
     if not any(isinstance(target, TipTarget) for target in spec.targets):
         given = [f"--{name} has no effect: no target is a tip=X,Y,Z" for name in ("constraint", "pitch")
                  if source(name) is ParameterSource.COMMANDLINE]  # fmt: skip
+    if source("pass_via") is ParameterSource.COMMANDLINE and not spec.via:
+        given.append("--pass-via has no effect: no --via is given")
     return (*given, *pitch_doubts(spec.pitch))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from boom_model import InputError
 from boom_model.plausible import Range
-from planner.cli.completion import OutFile
+from planner.cli.completion import OutFile, any_file
 from planner.cli.options import (
     all_option,
     epsg_option,
@@ -26,7 +26,7 @@ _FEW = 3
 
 
 @click.command()
-@click.argument("source", metavar="MAP")
+@click.argument("source", metavar="MAP", shell_complete=any_file)
 @click.option("--out", type=OutFile(*_MAPS), metavar="FILE", help="Write .geojson, .gpkg, .shp or .csv.")
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Draw the map.")
 @click.option("--at", "points", multiple=True, metavar="LAT,LON", help="Which plot a point is on; may be given again.")

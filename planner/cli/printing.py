@@ -5,6 +5,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import redirect_stdout, suppress
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 ANSWER_IS_NO, BAD_INPUT = 1, 2
 _FEW_NOTES = 3
+_LONGEST, _FEWEST = 24, 2
+"""Lines of an answer, and findings that it shows at least."""
 _BETWEEN = 2  # spaces between two cells
 _SHORT = 18
 """Largest number of characters of a cell that is never folded."""
@@ -63,7 +66,8 @@ def print_report(
     if as_json:
         print_json(report.to_json(dict(written)))
     else:
-        _print_answer(report, first, asked, whole)
+        ends = [*([] if cost is None else [cost]), *(f"{kind}: {name}" for kind, name in written.items())]
+        _print_answer(report, first, asked, whole, [*ends, *([] if then is None else [f"next: {then}"])])
         print_lines(None, [] if cost is None or whole else [cost])
         if whole:
             _print_details(report)
@@ -75,7 +79,12 @@ def print_report(
     return ANSWER_IS_NO
 
 
-def _print_answer(report: "Report", first: "Answer", asked: str, whole: bool) -> None:
+def _print_answer(report: "Report", first: "Answer", asked: str, whole: bool, ends: Sequence[str]) -> None:
+    """Print the request, the verdict, the table of joints, findings, fixes and notes.
+
+    Unless `whole`, there are no more findings than an answer of _LONGEST lines has room for, with
+    the lines `ends` that follow.
+    """
     from planner.reports.answer import JOINT_HEADER
 
     console = new_console()
@@ -87,15 +96,39 @@ def _print_answer(report: "Report", first: "Answer", asked: str, whole: bool) ->
         drop=("at", "motor", "gearbox", "used"),
         styles=[STYLES.get(r[-1][:4]) for r in first.joints],
     )
-    for finding in first.findings:
+    told = [f"{len(report.notes)} notes: --all lists them"] if len(report.notes) > _FEW_NOTES else list(report.notes)
+    figures = f"{first.assumed} assumed figure{'' if first.assumed == 1 else 's'}, {len(report.rows)} checks: --all lists them"
+    others = [asked, first.sentence, *(f"possible fix: {each}" for each in report.suggestions), figures, *ends]
+    others += [f"note: {each}" for each in told] + [f"measured: {each}" for each in report.measured]
+    room = _LONGEST - 2 - len(first.joints) - sum(_lines(text, console.width) for text in others)
+    shown = first.findings if whole else _first(first.findings, room, console.width)
+    for finding in shown:
         console.print(finding, style=STYLES.get(finding.split()[0]), highlight=False)
+    print_lines(
+        None, [f"{len(first.findings) - len(shown)} more that FAIL or WARN"] if len(shown) < len(first.findings) else []
+    )
     print_lines("possible fix", report.suggestions)
     if not whole:
-        few = len(report.notes) <= _FEW_NOTES
-        print_lines("note", report.notes if few else [f"{len(report.notes)} notes: --all lists them"])
-        figures = f"{first.assumed} assumed figure{'' if first.assumed == 1 else 's'}"
+        print_lines("note", told)
         print_lines("measured", report.measured)
-        console.print(f"{figures}, {len(report.rows)} checks: --all lists them", highlight=False)
+        console.print(figures, highlight=False)
+
+
+def _lines(text: str, width: int) -> int:
+    """Return the number of lines that a text takes."""
+    return max(1, len(wrap(text, width)))
+
+
+def _first(findings: Sequence[str], room: int, width: int) -> Sequence[str]:
+    """Return the findings that fit `room` lines, one of them for a count; at least _FEWEST."""
+    if sum(_lines(each, width) for each in findings) <= room:
+        return findings
+    used = 1
+    for k, each in enumerate(findings):
+        used += _lines(each, width)
+        if used > room and k >= _FEWEST:
+            return findings[:k]
+    return findings
 
 
 def _print_details(report: "Report") -> None:

@@ -7,16 +7,17 @@ import numpy as np
 
 from boom_model import InputError
 from boom_model.plausible import OFFSET, RATE, Range
-from planner.cli.completion import OneOf, OutFile
+from planner.cli.completion import OneOf, OutFile, any_file
 from planner.cli.options import (
     all_option,
     boom_option,
     constraint_option,
+    epsg_option,
+    figure_option,
     json_option,
     load_boom,
     outputs,
     payload_option,
-    plausible,
     with_names,
 )
 from planner.cli.printing import ANSWER_IS_NO, complain, print_files, print_json, print_lines, print_rows, tracked
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from planner.files import Outputs
     from planner.planning import Move
 
-_EPSG = Range(1024, 999_999, "")
 _SIDE = Range(0.01, 100.0, "m")
 _BESIDE = Range(0.1, 30.0, "m")
 _SHARE = Range(0.0, 0.9, "")
@@ -41,61 +41,21 @@ _FEW = 3
 
 
 @click.command()
-@click.argument("source", metavar="MAP")
+@click.argument("source", metavar="MAP", shell_complete=any_file)
 @click.option("--footprint", required=True, metavar="M,M", help="What the sensor sees: along the arm, across it.")
-@click.option(
-    "--rate", type=float, default=4.0, show_default=True, callback=plausible(RATE), metavar="HZ", help="Of the sensor."
-)
-@click.option(
-    "--tip-height",
-    type=float,
-    default=0.9,
-    show_default=True,
-    callback=plausible(OFFSET),
-    metavar="M",
-    help="Of the tip over the mount: canopy and distance, less the mount's height.",
-)
-@click.option(
-    "--offset",
-    type=float,
-    callback=plausible(_BESIDE),
-    metavar="M",
-    help="From the track to the middle of a row; default: where the fewest stops do.",
-)
-@click.option(
-    "--overlap",
-    type=float,
-    default=0.1,
-    show_default=True,
-    callback=plausible(_SHARE),
-    metavar="SHARE",
-    help="Of two lines beside each other.",
-)
-@click.option("--speed", type=float, callback=plausible(_PACE), metavar="M/S", help="Drive past the plots; default: stop.")
+@figure_option("--rate", RATE, "HZ", "Of the sensor.", 4.0)
+@figure_option("--tip-height", OFFSET, "M", "Of the tip over the mount: canopy and distance, less the mount's height.", 0.9)
+@figure_option("--offset", _BESIDE, "M", "From the track to the middle of a row; default: where the fewest stops do.")
+@figure_option("--overlap", _SHARE, "SHARE", "Of two lines beside each other.", 0.1)
+@figure_option("--speed", _PACE, "M/S", "Drive past the plots; default: stop.")
 @click.option(
     "--passes",
     type=click.IntRange(1, 99),
     metavar="N",
     help="Along each row at that speed; default: the fewest that the boom can follow.",
 )
-@click.option(
-    "--drive-speed",
-    type=float,
-    default=1.0,
-    show_default=True,
-    callback=plausible(_PACE),
-    metavar="M/S",
-    help="From stop to stop, back along a row, and in turns.",
-)
-@click.option(
-    "--turn-radius",
-    type=float,
-    default=4.0,
-    show_default=True,
-    callback=plausible(_RADIUS),
-    metavar="M",
-    help="Of the vehicle's turns between rows (assumed).",
-)
+@figure_option("--drive-speed", _PACE, "M/S", "From stop to stop, back along a row, and in turns.", 1.0)
+@figure_option("--turn-radius", _RADIUS, "M", "Of the vehicle's turns between rows (assumed).", 4.0)
 @click.option(
     "--track", "log", type=click.Path(), metavar="LOG", help="Log of the vehicle to drive along, as boom geotag reads."
 )
@@ -103,14 +63,14 @@ _FEW = 3
 @click.option("--profile", type=OneOf(_PROFILES), default="jerk-limited", show_default=True, help="How the moves are timed.")
 @constraint_option
 @click.option("--mission", type=OutFile(".toml"), metavar="FILE.toml", help="The scan as a mission, for boom mission and size.")
-@click.option("--out", type=OutFile(".geojson", ".json", ".shp", ".csv"), metavar="FILE", help="The plots with their coverage.")
+@click.option(
+    "--out", type=OutFile(".geojson", ".json", ".gpkg", ".shp", ".csv"), metavar="FILE", help="The plots with their coverage."
+)
 @click.option("--picture", type=OutFile(".png"), metavar="FILE.png", help="Plots, coverage and track.")
 @click.option("--recording", type=OutFile(".rrd"), metavar="FILE.rrd", help="The day in 3D, beside a map.")
 @click.option("--report", "document", type=OutFile(".md", ".html", ".pdf"), metavar="FILE", help="Write .md, .html or .pdf.")
 @payload_option
-@click.option(
-    "--epsg", type=int, callback=plausible(_EPSG), metavar="CODE", help="Reference system of eastings and northings read."
-)
+@epsg_option
 @boom_option
 @all_option
 @json_option

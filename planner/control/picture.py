@@ -58,8 +58,8 @@ def loop_figure(study: Study) -> "Figure":
     axes[2, 0].set_ylabel("imaginary part / 2 pi [Hz]")
     axes[0, 0].legend(fontsize=8, loc="lower left")
     figure.suptitle(
-        f"{study.boom.name}: each joint's loop at the goal with the others closed; closed-loop poles. "
-        "Dotted: natural frequencies with the motors fixed",
+        f"{study.boom.name}: each joint's loop at the goal\nwith the others closed; closed-loop poles.\n"
+        "Dotted: natural frequencies, motors fixed",
         fontsize=10,
     )
     return figure

@@ -110,6 +110,9 @@ class Calibrated:
     equal_links_chance: float | None
     """Probability of residuals that much larger if the links were equal."""
     notes: tuple[str, ...]
+    """What was found and left out."""
+    interval_notes: tuple[str, ...]
+    """Why the intervals are wider than the stated noise makes them."""
 
     @property
     def unequal(self) -> bool:
@@ -467,8 +470,7 @@ def _result(
         notes.append(
             f"{int(measured.by_distance.sum())} poses are measured by their distance: the error of that counts for them"
         )
-    if stated and widened > 1.0:
-        notes.append(f"the intervals are widened by {factor:.2g}: more noise than stated, or the model lacks something")
+    cause = f"the intervals are widened by {factor:.2g}: more noise than stated, or the model lacks something"
     if (~fit.used).any():
         poses = np.flatnonzero(~fit.used)
         far = [f"{pose + 1} ({1e3 * float(np.linalg.norm(np.nan_to_num(fit.residuals[pose]))):.1f} mm)" for pose in poses]
@@ -499,6 +501,7 @@ def _result(
         equal_links_rms=equal_rms,
         equal_links_chance=chance,
         notes=tuple(notes),
+        interval_notes=(cause,) if stated and widened > 1.0 else (),
     )
 
 

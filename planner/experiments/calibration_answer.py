@@ -109,7 +109,7 @@ def to_json(found: Calibrated, check: Check | None, files: dict[str, str]) -> di
             "after_rms_m": check.after,
             "expected_rms_m": check.expected,
         },
-        "notes": list(found.notes),
+        "notes": [*found.interval_notes, *found.notes],
         "files": files,
     }
 

@@ -114,6 +114,8 @@ class Identification:
     """Of the logs [s]"""
     cutoff: float
     notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    """Faults of the logs that another measurement would avoid."""
 
     @cached_property
     def parameters(self) -> Array:
@@ -220,7 +222,7 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
     told = int((np.linalg.eigvalsh(H) > 1.0).sum())
     base = _base_fit(unknowns, K, names, H, b)
     found = Identification(
-        unknowns, x, covariance, base, told, len(K), (), sum(log.t[-1] - log.t[0] for log in logs), logs[0].cutoff, ()
+        unknowns, x, covariance, base, told, len(K), (), sum(log.t[-1] - log.t[0] for log in logs), logs[0].cutoff, (), ()
     )
     joints = _joint_fits(found, seen, kept)
     silent = () if told >= len(K) else (
@@ -231,10 +233,12 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
         *dict.fromkeys(note for log in logs for note in log.notes),
         *silent,
         *(() if drive_inertia else _rotor_notes(found, logs)),
+    )
+    warnings = (
         *residual_notes(np.array([joint.after for joint in joints]), np.array([joint.noise for joint in joints])),
         *delay_notes(*_delay(found, seen, data, H, variance)),
     )
-    return replace(found, joints=joints, notes=notes)
+    return replace(found, joints=joints, notes=notes, warnings=warnings)
 
 
 def _data(unknowns: Unknowns, logs: Sequence[Readings]) -> _Data:
@@ -458,6 +462,7 @@ def to_json(found: Identification, files: dict[str, str]) -> dict[str, Any]:
             {"name": name, "value": float(value), "deviation": float(sigma), "start": float(start)}
             for name, value, sigma, start in zip(base.names, base.values, base.deviations, base.start, strict=True)
         ],
-        "notes": list(found.notes),
+        "notes": [*found.notes, *found.warnings],
+        "warnings": list(found.warnings),
         "files": files,
     }

@@ -149,8 +149,13 @@ def rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
     if design.equal_constraints is not None:
         theirs, ours = design.equal_constraints
         found.append(("plates with the thesis's constraints", "-", f"{theirs:.4f} kg thesis, {ours:.4f} kg exact", "-"))
+    return found
+
+
+def check_rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
+    """Return the checks by finite elements, under ROWS_HEADER."""
     within = "stress at {:.0f} to {:.0f} % of the length".format(*(100.0 * share for share in INSIDE))
-    found += [
+    found = [
         (
             f"check: {c.model}, {c.elements} elements; {within}",
             "-",
@@ -165,7 +170,7 @@ def rows(design: LinkDesign) -> list[tuple[str, str, str, str]]:
                 f"check: Euler-Bernoulli beam, {s.elements} elements; where the stress is largest, x = {s.x:.4g} m",
                 "-",
                 f"{1e-6 * s.by_elements:.1f} MPa, design {1e-6 * s.own:.1f} MPa",
-                f"{1e-6 * limits.stress:.4g} MPa",
+                f"{1e-6 * design.limits.stress:.4g} MPa",
             )
         )
     return found
@@ -218,7 +223,7 @@ def motor_rows(design: LinkDesign) -> list[tuple[str, ...]]:
 def to_markdown(design: LinkDesign) -> str:
     """Return the report as Markdown."""
     lines = [f"# {title(design)}", "", *(f"- {text}" for text in sentences(design)), ""]
-    for header, body in ((ROWS_HEADER, rows(design)), (MOTORS_HEADER, motor_rows(design))):
+    for header, body in ((ROWS_HEADER, [*rows(design), *check_rows(design)]), (MOTORS_HEADER, motor_rows(design))):
         if body:
             lines += [*table(header, body), ""]
     assumed = assumptions(design.before, any(motion.qddd is not None for motion in design.trajectories))

@@ -43,7 +43,7 @@ _SAME_POSITION = 1e-6
 _DECIMALS = 9
 _DOWN, _HORIZONTAL = "down", "horizontal"
 _KINDS = ("to", "hold_s", "pause_s", "motion", "repeat")
-_SHARED = ("profile", "pass_via", "jerk_bound", "average_torque", "along", "pitch", "constraint")
+_SHARED = ("profile", "pass_via", "jerk_bound", "average_torque", "along")
 """Keys of a step that have the name and meaning of fields of MoveWords."""
 _Duration = Annotated[float, DURATION]
 _Sample = Annotated[list[float], Field(min_length=6, max_length=6)]
@@ -59,8 +59,10 @@ class _Step(Table):
     jerk_bound: bool = False
     average_torque: bool = False
     duration_s: _Duration | None = None
-    pitch: str = _DOWN
-    constraint: str = _HORIZONTAL
+    pitch: str | None = None
+    """None takes that of the mission."""
+    constraint: str | None = None
+    """None takes that of the mission."""
     hold_s: _Duration | None = None
     pause_s: _Duration | None = None
     motion: Annotated[list[_Sample], Field(min_length=4)] | None = None
@@ -93,7 +95,9 @@ class _MissionTable(Table):
     source: str
     start: str
     pitch: str = _DOWN
+    """Of the start, and of every step that gives none."""
     constraint: str = _HORIZONTAL
+    """Of the start, and of every step that gives none."""
     required_life_h: Annotated[float, LIFE] | None = None
     tip_tolerance_mm: Annotated[float, TIP_TOLERANCE] | None = None
     plots: Annotated[int, Field(gt=0)] | None = None
@@ -287,7 +291,7 @@ def plan_cycle(boom: Boom, mission: Mission, vehicle: VehicleCase = LEVEL, step:
         key = (id(part), tuple(np.round(q, _DECIMALS) + 0.0))  # positions return up to rounding
         if key not in known:
             try:
-                leg, after, said = _leg(boom, part, q, vehicle, step)
+                leg, after, said = _leg(boom, table, part, q, vehicle, step)
             except (InputError, InfeasibleError) as error:
                 kind = InputError if isinstance(error, InputError) else InfeasibleError
                 raise kind(f"mission {mission.name}, {where}: {error}") from None
@@ -369,10 +373,12 @@ def _jerk_limited(steps: list[_Step]) -> bool:
     return any(step.jerk_bound or step.profile == JerkLimited.name or _jerk_limited(step.steps) for step in steps)
 
 
-def _leg(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -> tuple[Leg | None, Array, tuple[str, ...]]:
+def _leg(
+    boom: Boom, table: _MissionTable, part: _Step, q: Array, vehicle: VehicleCase, step: float
+) -> tuple[Leg | None, Array, tuple[str, ...]]:
     """Return a step's leg (None if nothing moves), the joint position at its end, and its notes."""
     if part.to is not None:
-        return _move(boom, part, q, vehicle, step)
+        return _move(boom, table, part, q, vehicle, step)
     if part.motion is not None:
         return _recorded(part.motion, q)
     seconds, powered = (part.hold_s, True) if part.hold_s is not None else (part.pause_s, False)
@@ -390,7 +396,9 @@ def _recorded(samples: list[list[float]], q: Array) -> tuple[Leg, Array, tuple[s
     return Leg("a motion of the file", through_rest(table[:, 0] - table[0, 0], table[:, 1:]), True, True), table[-1, 1:], ()
 
 
-def _move(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) -> tuple[Leg | None, Array, tuple[str, ...]]:
+def _move(
+    boom: Boom, table: _MissionTable, part: _Step, q: Array, vehicle: VehicleCase, step: float
+) -> tuple[Leg | None, Array, tuple[str, ...]]:
     by_joints = part.along == "joint"
     x, y, z = (float(v) for v in forward_kinematics(boom, q).position)
     words = MoveWords(
@@ -399,6 +407,8 @@ def _move(boom: Boom, part: _Step, q: Array, vehicle: VehicleCase, step: float) 
         via=tuple(part.via),
         via_velocity=tuple(part.via_velocity),
         duration=part.duration_s,
+        pitch=table.pitch if part.pitch is None else part.pitch,
+        constraint=table.constraint if part.constraint is None else part.constraint,
         **{name: getattr(part, name) for name in _SHARED},
     )
     start: Target = q if by_joints else TipTarget((x, y, z))

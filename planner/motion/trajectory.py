@@ -214,8 +214,22 @@ def csv_table(path: str | Path) -> "pa.Table":
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (pa.ArrowInvalid, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a motion's CSV: {error}") from None
+        reason = _OTHER_FILES.get(Path(path).suffix, f"not a motion's CSV: {error}")
+        raise InputError(f"{path}: {reason}") from None
+    if table.num_columns == 1 and ";" in table.column_names[0]:
+        raise InputError(
+            f"{path}: its columns are separated by semicolons; a motion's CSV has commas, and points in its numbers"
+        )
     return table
+
+
+_OTHER_FILES = {
+    ".rrd": "a recording is not read back; boom plan START GOAL --csv FILE.csv writes the motion of a plan",
+    ".toml": "not a motion; it is the file of a boom, a vehicle or a mission",
+    ".yaml": "a ROS trajectory is not read back; give its CSV or Parquet file",
+    ".yml": "a ROS trajectory is not read back; give its CSV or Parquet file",
+    ".json": "a ROS trajectory is not read back; give its CSV or Parquet file",
+}
 
 
 def opened(path: str | Path) -> "pa.OSFile":

@@ -1,5 +1,6 @@
 """Targets of a move: named pose, joint position, or tip position with pitch and constraint."""
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,9 @@ def parse_target(text: str) -> Target:
     """
     kind, equals, rest = text.partition("=")
     if not equals:
+        if re.fullmatch(r"[-+\d.eE ]+(,[-+\d.eE ]+)+", text):
+            form = f"tip={text}" if text.count(",") == 2 else "q=DEG,DEG,DEG,M,DEG or tip=X,Y,Z"
+            raise InputError(f"{text!r} is not the name of a pose; numbers are given as {form}")
         return text
     if kind == "q":
         return joint_position(text, rest)
@@ -65,8 +69,8 @@ def parse_along(text: str) -> str | Array:
     """
     if text in ("joint", "line"):
         return text
-    kind, _, rest = text.partition("=")
-    if kind != "arc":
+    kind, equals, rest = text.partition("=")
+    if kind != "arc" or not equals:
         raise unknown("along", text, ("joint", "line", "arc=X,Y,Z"))
     return np.array(numbers(text, rest, 3))
 

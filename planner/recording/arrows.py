@@ -44,7 +44,8 @@ class Scale:
     @property
     def sentence(self) -> str:
         """The scale as text for a title."""
-        shown = [f"1 m = {value:g} {unit}" for value, unit in ((self.force, "N"), (self.moment, "Nm")) if value is not None]
+        kinds = (("white", self.force, "N"), ("purple", self.moment, "Nm"))
+        shown = [f"{color} 1 m = {value:g} {unit}" for color, value, unit in kinds if value is not None]
         return f"arrows: {', '.join(shown)}" if shown else "no arrows"
 
 
@@ -81,8 +82,8 @@ def log_arrows(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, lo
         return
     for pin in _PINS:
         _log_style(recording, f"pin_{pin}", f"pin {pin}", _FORCE)
-    _log_style(recording, "mount_force", "force", _FORCE)
-    _log_style(recording, "mount_moment", "moment", _MOMENT)
+    _log_style(recording, "mount_force", "force on the mount", _FORCE, named=False)
+    _log_style(recording, "mount_moment", "moment on the mount", _MOMENT, named=False)
     for start in range(0, len(t), POSES_AT_ONCE):
         part = slice(start, start + POSES_AT_ONCE)
         for name, origins, vectors in arrows(boom, q[part], loads, scale, part):
@@ -120,6 +121,7 @@ def arrows(boom: Boom, q: Array, loads: Loads, scale: Scale, part: slice = slice
         yield "mount_moment", foot, loads.mount[part, 3:] / scale.moment
 
 
-def _log_style(recording: rr.RecordingStream, name: str, label: str, color: Color) -> None:
-    style = rr.Arrows3D.from_fields(colors=[color], radii=[0.007], labels=[label], show_labels=True)
+def _log_style(recording: rr.RecordingStream, name: str, label: str, color: Color, *, named: bool = True) -> None:
+    """Log colour and label; a label that is not `named` shows where the mouse points."""
+    style = rr.Arrows3D.from_fields(colors=[color], radii=[0.007], labels=[label], show_labels=named)
     recording.log(f"world/loads/{name}", style, rr.CoordinateFrame("mount"), static=True)

@@ -9,13 +9,13 @@ import rerun.blueprint as rrb
 from boom_model import JOINTS
 from boom_model.boom import LOAD_UNITS
 from planner.experiments.residuals import Residuals
-from planner.recording.layout import eye_of, grid, scene, shown_beside, text
+from planner.recording.layout import PlotTab, eye_of, scene, shown_beside, text
 from planner.recording.palette import (
     AFTER_COLOR,
-    JOINT_COLORS,
     LIMIT_COLOR,
     PART_COLORS,
     PAYLOAD_COLOR,
+    SKY_BLUE,
     VERMILION,
 )
 from planner.recording.plots import Bundle
@@ -53,11 +53,12 @@ def write_before_after_recording(path: str | Path, found: Residuals, report: str
     Raises:
         InputError: the file cannot be written. An existing file is left unchanged.
     """
-    bundles, after, before = before_after_bundles(found), found.after, found.before
+    after, before = found.after, found.before
+    tabs = [PlotTab(name, bundles) for name, bundles in before_after_bundles(found).items()]
     reached = np.concatenate([after.tip, before.tip])
 
     def log(recording: rr.RecordingStream) -> None:
-        right = rrb.Tabs(*(grid(name, tab) for name, tab in bundles.items()), text("report", "Report"), active_tab=0)
+        right = rrb.Tabs(*(tab.view for tab in tabs), text("report", "Report"), active_tab=0)
         view = scene("Boom [m]", eye_of(after.boom, after.q), ground_level(after.boom, reached))
         recording.send_blueprint(shown_beside(view, right, [1, 1]))
         log_markdown(recording, "report", report)
@@ -69,8 +70,8 @@ def write_before_after_recording(path: str | Path, found: Residuals, report: str
         log_surroundings(recording, after.boom, reached)
         log_path(recording, "world/tip_path", after.tip, PAYLOAD_COLOR)
         log_path(recording, f"{BEFORE.entity}/tip_path", before.tip, LIMIT_COLOR)
-        for bundle in (bundle for tab in bundles.values() for bundle in tab):
-            bundle.log(recording, found.t)
+        for tab in tabs:
+            tab.log(recording, found.t)
 
     save(path, f"{after.boom.name}: before and after", log)
 
@@ -87,7 +88,7 @@ def before_after_bundles(found: Residuals) -> dict[str, list[Bundle]]:
         models = [fit.total[:, i] for fit in (before, after)]
         names = [f"measured [{unit}]", *pair]
         both = np.stack([found.tau[:, i], *models], axis=-1)
-        torques.append(Bundle(f"plots/tau/{joint}", f"{joint} [{unit}]", names, [JOINT_COLORS[joint], *colors], both))
+        torques.append(Bundle(f"plots/tau/{joint}", f"{joint} [{unit}]", names, [SKY_BLUE, *colors], both))
         changes = {name: (after.parts[name] - before.parts[name])[:, i] for name in after.parts}
         shades = [PART_COLORS.get(name, VERMILION) for name in changes]
         values = np.stack(list(changes.values()), axis=-1)

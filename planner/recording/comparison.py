@@ -11,8 +11,8 @@ from boom_model.boom import IS_LENGTH
 from planner.experiments.comparison import Comparison
 from planner.experiments.residuals import Residuals
 from planner.recording.before_after import before_after_bundles
-from planner.recording.layout import eye_of, grid, scene, shown_beside, text
-from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, PAYLOAD_COLOR
+from planner.recording.layout import PlotTab, eye_of, scene, shown_beside, text
+from planner.recording.palette import JOINT_COLORS, LIMIT_COLOR, PAYLOAD_COLOR, SKY_BLUE
 from planner.recording.plots import Bundle, for_people
 from planner.recording.scene import (
     PLANNED,
@@ -52,14 +52,14 @@ def write_comparison_recording(path: str | Path, comparison: Comparison, models:
         InputError: the file cannot be written. An existing file is left unchanged.
     """
     boom, planned, measured = comparison.boom, comparison.planned, comparison.measured
-    bundles, more = _bundles(comparison), {} if models is None else before_after_bundles(models)
-    named = {f"{name}: before, after": tab for name, tab in more.items() if name != "Torques"}
+    tabs = [PlotTab(name, bundles) for name, bundles in _bundles(comparison).items()]
+    more = {} if models is None else before_after_bundles(models)
+    named = [PlotTab(f"{name}: before, after", bundles) for name, bundles in more.items() if name != "Torques"]
     tips = [forward_kinematics(boom, motion.q).position for motion in (measured, planned)]
     reached = np.concatenate(tips)
 
     def log(recording: rr.RecordingStream) -> None:
-        tabs = [grid(name, tab) for name, tab in (bundles | named).items()]
-        right = rrb.Tabs(*tabs, text("report", "Report"), active_tab=0)
+        right = rrb.Tabs(*(tab.view for tab in (*tabs, *named)), text("report", "Report"), active_tab=0)
         view = scene("Boom [m]", eye_of(boom, planned.q), ground_level(boom, reached))
         recording.send_blueprint(shown_beside(view, right, [1, 1]))
         notes = "\n".join(f"- {note}" for note in (_LEGEND, *comparison.notes))
@@ -72,11 +72,11 @@ def write_comparison_recording(path: str | Path, comparison: Comparison, models:
         log_surroundings(recording, boom, reached)
         log_path(recording, "world/tip_path", tips[0], PAYLOAD_COLOR)
         log_path(recording, "world/planned/tip_path", tips[1], LIMIT_COLOR)
-        for bundle in (bundle for tab in bundles.values() for bundle in tab):
-            bundle.log(recording, planned.t)
-        for bundle in (bundle for tab in named.values() for bundle in tab):
+        for tab in tabs:
+            tab.log(recording, planned.t)
+        for tab in named:
             assert models is not None
-            bundle.log(recording, models.t + comparison.offset)
+            tab.log(recording, models.t + comparison.offset)
 
     save(path, f"{boom.name}: measured and planned", log)
 
@@ -90,7 +90,7 @@ def _bundles(c: Comparison) -> dict[str, list[Bundle]]:
     for i, joint in enumerate(JOINTS):
         unit, force = ("m", "N") if IS_LENGTH[i] else ("deg", "Nm")
         color, pair = JOINT_COLORS[joint], ["planned", "measured"]
-        both = [LIMIT_COLOR, color]
+        both = [LIMIT_COLOR, SKY_BLUE]
         positions = np.stack([for_people(i, motion.q[:, i]) for motion in (c.planned, c.measured)], axis=-1)
         tabs["Positions"].append(Bundle(f"plots/q/{joint}", f"{joint} position [{unit}]", pair, both, positions))
         error = for_people(i, c.joint_error[:, i, None])

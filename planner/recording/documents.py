@@ -2,17 +2,25 @@
 
 from boom_model import Boom
 from planner.checks.rows import Verdict
+from planner.planning import Move
 from planner.recording.arrows import ARROWS_NOTE
 from planner.recording.scene import SURROUNDINGS_NOTE
 from planner.reports.answer import JOINT_HEADER, answer
+from planner.reports.first_page import circumstances
 from planner.reports.markdown import section, table
 from planner.reports.report import Report, cells
 
 CHECK_HEADER = ("verdict", "joint", "check", "demand", "limit", "margin", "required", "at", "basis")
 
 
-def answer_markdown(boom: Boom, report: Report) -> str:
-    """Return the lines that the command prints first: verdict, table of joints, findings, possible fixes."""
+def answer_markdown(move: Move, report: Report, title: str = "") -> str:
+    """Return what the command prints first: verdict, joints, findings, possible fixes.
+
+    Args:
+        move: the move.
+        report: its report.
+        title: what moves where; empty for a motion without a name.
+    """
     first = answer(report)
     listed = [*first.findings, *(f"possible fix: {each}" for each in report.suggestions)]
     listed += [f"measured: {each}" for each in report.measured]
@@ -21,7 +29,7 @@ def answer_markdown(boom: Boom, report: Report) -> str:
         [
             f"# {first.verdict}",
             "",
-            f"{report.profile}, {report.duration:.3f} s, payload {boom.payload.mass:g} kg",
+            f"{title}{': ' if title else ''}{circumstances(move.boom, move.vehicle, report)}",
             "",
             first.sentence.partition(": ")[2],
             "",

@@ -12,7 +12,6 @@ from planner.checks.kinds import CheckKind
 from planner.planning import Move
 from planner.recording.palette import (
     GREEN,
-    JOINT_COLORS,
     LIMIT_COLOR,
     ORANGE,
     PAYLOAD_COLOR,
@@ -40,7 +39,7 @@ def motor_bundles(move: Move) -> Iterator[Bundle]:
             asked = drive.motor.torque_margin
             names = ["torque [Nm]", f"available ({basis}) [Nm]", f"with {asked:.0%} margin ({basis}) [Nm]"]
             values = np.stack([np.abs(torque), curve, curve / (1.0 + asked)], axis=-1)
-            colors = [JOINT_COLORS[joint], PAYLOAD_COLOR, LIMIT_COLOR]
+            colors = [SKY_BLUE, PAYLOAD_COLOR, LIMIT_COLOR]
             yield Bundle(f"plots/motor/{joint}", f"{joint}, {drive.motor.name} [Nm]", names, colors, values)
 
 
@@ -64,7 +63,7 @@ def gearbox_bundles(move: Move) -> Iterator[Bundle]:
         names = ["torque [Nm]", *(f"{name} [Nm]" for name in known)]
         values = np.stack([tau[:, i], *(np.full(len(tau), value) for value in known.values())], axis=-1)
         kinds = {"rated": PAYLOAD_COLOR, "largest average": ORANGE, "start-stop": LIMIT_COLOR, "average of the cycle": GREEN}
-        colors = [JOINT_COLORS[joint], *(kinds[name] for name in known)]
+        colors = [SKY_BLUE, *(kinds[name] for name in known)]
         yield Bundle(f"plots/gearbox/{joint}", f"{joint}, {gear.name} [Nm]", names, colors, values)
 
 
@@ -89,8 +88,8 @@ def margin_bundles(move: Move) -> Iterator[Bundle]:
             required["motor, required"] = drive.motor.torque_margin
         shown = [*curves.values(), *(np.full(len(tau), value) for value in required.values())]
         names = [f"{name} [%]" for name in (*curves, *required)]
-        kinds = {"gearbox, start-stop": JOINT_COLORS[joint], "gearbox, momentary peak": PURPLE}
-        colors = [*(kinds.get(name, TOTAL_COLOR) for name in curves), *(LIMIT_COLOR, ORANGE)[: len(required)]]
+        kinds = {"gearbox, start-stop": SKY_BLUE, "gearbox, momentary peak": PURPLE}
+        colors = [*(kinds.get(name, TOTAL_COLOR) for name in curves), *(LIMIT_COLOR, YELLOW)[: len(required)]]
         title = f"{joint}: (limit - demand) / demand, up to {MOST_MARGIN:.0%} [%]"
         if curves:
             yield Bundle(f"plots/margin/{joint}", title, names, colors, 100.0 * np.stack(shown, axis=-1))
@@ -112,10 +111,10 @@ def tip_bundle(move: Move) -> Bundle:
         "backlash": (budget.backlash, GREEN),
         "step error": (budget.step, PURPLE),
     }
-    title = "largest tip deflection caused by the drives [mm]"
+    title = "largest tip deflection caused by the drives [mm], no limit is given"
     if move.boom.calibration is not None:
         parts[f"geometry, {SURE:g} sd"] = SURE * budget.geometry, YELLOW
-        title = "largest tip error by drives and measured geometry [mm]"
+        title = "largest tip error by drives and measured geometry [mm], no limit is given"
     parts["total"] = budget.total, TOTAL_COLOR
     curves, colors = zip(*parts.values(), strict=True)
     names = [f"{name} [mm]" for name in parts]

@@ -121,14 +121,14 @@ def power_bundles(powers: Sequence[JointPower]) -> Iterator[Bundle]:
     """Yield the power of each joint: at the joint, and of a known drive what it loses and what it takes."""
     for power in powers:
         known = {
-            "at the joint": (power.output, JOINT_COLORS[power.joint]),
+            "at the joint": (power.output, SKY_BLUE),
             "windings": (power.copper, ORANGE),
             "gear loss": (power.gear_loss, PURPLE),
             "electrical": (power.electrical, GREEN),
         }
         series = {name: (values, color) for name, (values, color) in known.items() if values is not None}
-        title = f"{power.joint} power [W]"
-        names = [*series] if len(series) > 1 else [title]
+        title = f"{power.joint} power [W]" + ("" if power.electrical is not None else ", no drive is given")
+        names = [*series]
         colors, values = [color for _, color in series.values()], [values for values, _ in series.values()]
         yield Bundle(f"plots/power/{power.joint}", title, names, colors, np.stack(values, axis=-1))
 
@@ -145,9 +145,9 @@ def load_bundles(mount: Mount, loads: Loads) -> Iterator[Bundle]:
             names.append("limit" if limit.origin.basis is Basis.PRINTED else f"limit ({limit.origin.basis})")
             colors.append(LIMIT_COLOR)
             series.append(np.full(len(vectors), limit.value))
-        title = f"{kind} on the mount [{unit}]"
+        title = f"{kind} on the mount [{unit}]" + ("" if limit is not None else ", no limit is given")
         yield Bundle(f"plots/mount/{kind}", title, [f"{n} [{unit}]" for n in names], colors, np.stack(series, axis=-1))
     pins = {6: loads.pins.frame_6, 7: loads.pins.frame_7, 8: loads.pins.frame_8}
     sizes = np.stack([np.linalg.norm(force, axis=-1) for force in pins.values()], axis=-1)
     names = [f"pin {pin} [N]" for pin in pins]
-    yield Bundle("plots/pins", "magnitude of the pin forces [N]", names, [YELLOW, GREEN, SKY_BLUE], sizes)
+    yield Bundle("plots/pins", "magnitude of the pin forces [N], no limit is given", names, [YELLOW, GREEN, SKY_BLUE], sizes)

@@ -1,6 +1,7 @@
 """Layout of a recording: the scene on the left, tabs on the right."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
@@ -9,13 +10,46 @@ import rerun.blueprint as rrb
 from boom_model import Boom
 from boom_model.arrays import Array
 from boom_model.kinematics.frames import frame_transforms
+from planner.recording.legend import Legend, log_names, names_view
 from planner.recording.plots import Bundle, Plot
 
 
-def grid(name: str, plots: Iterable[Plot | Bundle]) -> rrb.Grid:
-    """Return a tab of plots, in two columns if there are more than two."""
-    views = [plot.view for plot in plots]
-    return rrb.Grid(*views, grid_columns=2 if len(views) > 2 else 1, name=name)
+@dataclass(frozen=True, eq=False)
+class PlotTab:
+    """Plots with one legend for all of them below.
+
+    Up to two plots stand in a column, up to four in two and more in three: the scale of a plot that
+    is not tall has hardly a number.
+    """
+
+    name: str
+    plots: Sequence[Plot | Bundle]
+    root: str = "legends"
+    """Entity below which the legend is logged."""
+
+    @property
+    def legend(self) -> Legend:
+        """Names and colours of all curves that the titles of the plots do not name."""
+        return list(dict.fromkeys(entry for plot in self.plots for entry in plot.legend))
+
+    @property
+    def view(self) -> rrb.Grid | rrb.Vertical:
+        """The tab."""
+        count = len(self.plots)
+        columns = 1 if count <= 2 else 2 if count <= 4 else 3
+        views = rrb.Grid(*(plot.view for plot in self.plots), grid_columns=columns, name=self.name)
+        return rrb.Vertical(views, names_view(self._place), row_shares=[12, 1], name=self.name) if self.legend else views
+
+    def log(self, recording: rr.RecordingStream, t: Array) -> None:
+        """Log all plots at times t (n,), and the legend."""
+        for plot in self.plots:
+            plot.log(recording, t)
+        if self.legend:
+            log_names(recording, self._place, self.legend)
+
+    @property
+    def _place(self) -> str:
+        return f"{self.root}{rr.new_entity_path([self.name.lower()])}"
 
 
 def text(entity: str, name: str) -> rrb.TextDocumentView:
@@ -49,7 +83,7 @@ def eye_of(boom: Boom, *motions: Array) -> rrb.EyeControls3D:
     return eye_on(points, float(motions[0][len(motions[0]) // 2, 0]))
 
 
-def eye_on(points: Array, yaw: float, away: float = 0.95) -> rrb.EyeControls3D:
+def eye_on(points: Array, yaw: float, away: float = 1.1) -> rrb.EyeControls3D:
     """Return a camera that sees all points (k, 3) from the right of a boom, slightly from above.
 
     Args:

@@ -12,7 +12,7 @@ from boom_model.kinematics.frames import R_LINK_BODY
 from planner.links.design import LinkDesign
 from planner.links.picture import write_link_picture
 from planner.links.report import title, to_markdown
-from planner.recording.layout import eye_of, scene, shown_beside, text
+from planner.recording.layout import PlotTab, eye_of, scene, shown_beside, text
 from planner.recording.palette import COLORS, LIMIT_COLOR, PAYLOAD_COLOR
 from planner.recording.plots import Bundle
 from planner.recording.scene import boxes, ground_level, log_motion, log_mount, log_path, log_solids, log_surroundings
@@ -47,6 +47,7 @@ def write_link_recording(path: str | Path, design: LinkDesign) -> None:
         [LIMIT_COLOR, COLORS[link.name]],
         np.stack([before, after], axis=-1),
     )
+    torques = PlotTab("Torque", [torque])
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "link.png"
         write_link_picture(picture, design)
@@ -55,7 +56,7 @@ def write_link_recording(path: str | Path, design: LinkDesign) -> None:
     def log(recording: rr.RecordingStream) -> None:
         views = rrb.Tabs(
             rrb.Spatial2DView(origin="/picture", name="Design"),
-            torque.view,
+            torques.view,
             text("report", "Report"),
             active_tab=0,
         )
@@ -70,7 +71,7 @@ def write_link_recording(path: str | Path, design: LinkDesign) -> None:
         log_surroundings(recording, boom, tip)
         log_path(recording, "world/tip_path", tip, PAYLOAD_COLOR)
         _log_plates(recording, design)
-        torque.log(recording, trajectory.t)
+        torques.log(recording, trajectory.t)
 
     save(path, title(design), log)
 

@@ -1,6 +1,5 @@
 """Recording of a move: the 3D scene with all its plots and documents."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import rerun as rr
@@ -13,10 +12,9 @@ from planner.planning import Move
 from planner.recording import drive_plots, joint_plots
 from planner.recording.arrows import arrow_scale, log_arrows
 from planner.recording.documents import answer_markdown, assumptions_markdown, checks_markdown
-from planner.recording.layout import eye_of, grid, scene, shown_beside, text
+from planner.recording.layout import PlotTab, eye_of, scene, shown_beside, text
 from planner.recording.legend import legend_view, log_legend
 from planner.recording.margin_bars import log_margins, margin_rows, margins_view
-from planner.recording.plots import Bundle, Plot
 from planner.recording.reach import boundary_sentence, log_boundary
 from planner.recording.scene import ground_level, log_height, log_motion, log_mount, log_solids, log_surroundings
 from planner.recording.states import events_view, lanes, log_events, log_lanes, states_view
@@ -27,7 +25,7 @@ from planner.recording.torque_speed import log_plane, planes
 _TEXTS = ("assumptions", "checks", "report")
 
 
-def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = None) -> None:
+def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = None, title: str = "") -> None:
     """Write the recording of a move with its blueprint; `boom view` or `rerun` shows it.
 
     /world                    z up, the ground; frames are children of "tf#/world" [m]
@@ -73,43 +71,29 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
         path: the .rrd file.
         move: the move, with its loads and its report.
         reach: reach map to draw as a boundary that yaws with the boom; None draws no boundary.
+        title: what moves where, for the first tab; empty for a motion without a name.
 
     Raises:
         InputError: the file cannot be written. An existing file is left unchanged.
     """
     boom, trajectory, loads, report = move.boom, move.trajectory, move.loads, move.full_report
     ratios = torque_ratios(boom, trajectory, loads.tau)
-    torques: list[Plot | Bundle] = [*joint_plots.torque_plots(boom, trajectory, loads.tau), *joint_plots.ratio_bundles(ratios)]
-    joints = {
-        "Positions": joint_plots.position_plots(boom, trajectory),
-        "Velocities": joint_plots.velocity_plots(boom, trajectory),
-        "Accelerations": joint_plots.acceleration_plots(boom, trajectory),
-    }
-    powers = list(joint_plots.power_bundles(joint_powers(move.sampled)))
-    parts, forces = list(joint_plots.part_bundles(move.parts)), list(joint_plots.load_bundles(boom.mount, loads))
-    drives = {
-        "Margins": list(drive_plots.margin_bundles(move)),
-        "Motors": list(drive_plots.motor_bundles(move)),
-        "Gearboxes": list(drive_plots.gearbox_bundles(move)),
-    }
-    driven = any(drives.values())
-    if driven:
-        drives["Tip"] = [drive_plots.tip_bundle(move)]
+    torques = PlotTab("Torques", [*joint_plots.torque_plots(boom, trajectory, loads.tau), *joint_plots.ratio_bundles(ratios)])
+    motion, drives = _motion_tabs(move), _drive_tabs(move)
     tip = forward_kinematics(boom, trajectory.q).position
     bands = legend(known=bool(ratios))
     motors, scale, worst = list(planes(move)), arrow_scale(loads), worst_ratio(ratios)
 
-    drive_tabs: list[rrb.View | rrb.Container] = [grid(name, tab) for name, tab in drives.items() if tab]
+    drive_tabs: list[rrb.View | rrb.Container] = [tab.view for tab in drives]
     if motors:
         drive_tabs.insert(0, rrb.Vertical(*(plane.view for plane in motors), name="Torque-speed"))
     bars = {joint: rows for joint in JOINTS if (rows := margin_rows(move, joint))}
     if bars:
         drive_tabs.append(rrb.Vertical(*(margins_view(joint) for joint in bars), name="All margins"))
-    moving: dict[str, Sequence[Plot | Bundle]] = {**joints, "Torque parts": parts, "Power": powers, "Pins and mount": forces}
     tabs: list[rrb.View | rrb.Container] = [
         rrb.Vertical(text("answer", "Answer"), states_view(), events_view(), row_shares=[5, 2, 2], name="Answer"),
-        grid("Torques", torques),
-        rrb.Tabs(*(grid(name, tab) for name, tab in moving.items() if tab), active_tab=0, name="Motion"),
+        torques.view,
+        rrb.Tabs(*(tab.view for tab in motion), active_tab=0, name="Motion"),
         *([rrb.Tabs(*drive_tabs, active_tab=0, name="Drives")] if drive_tabs else []),
         rrb.Tabs(
             *(text(each, each.capitalize()) for each in ("assumptions", "checks", "report")), active_tab=0, name="Assumptions"
@@ -128,9 +112,9 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
     shown = lanes(move)
 
     def log(recording: rr.RecordingStream) -> None:
-        recording.send_blueprint(shown_beside(left, rrb.Tabs(*tabs, active_tab=0), [1, 1]))
+        recording.send_blueprint(shown_beside(left, rrb.Tabs(*tabs, active_tab=0), [2, 3]))
         log_properties(recording, boom, report)
-        log_markdown(recording, "answer", answer_markdown(boom, report))
+        log_markdown(recording, "answer", answer_markdown(move, report, title))
         log_markdown(recording, "report", report.to_markdown())
         log_markdown(recording, "checks", checks_markdown(report))
         log_markdown(recording, "assumptions", assumptions_markdown(boom, report))
@@ -146,13 +130,36 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
         log_arrows(recording, boom, trajectory.t, trajectory.q, loads, scale)
         if reach is not None:
             log_boundary(recording, reach)
-        for plot in (*torques, *(plot for tab in joints.values() for plot in tab)):
-            plot.log(recording, trajectory.t)
-        for bundle in (*parts, *powers, *forces, *(bundle for tab in drives.values() for bundle in tab)):
-            bundle.log(recording, trajectory.t)
+        for tab in (torques, *motion, *drives):
+            tab.log(recording, trajectory.t)
         for plane in motors:
             log_plane(recording, trajectory.t, plane)
         for joint, rows in bars.items():
             log_margins(recording, joint, rows)
 
     save(path, f"{boom.name}: {report.profile}, {report.duration:.3f} s", log)
+
+
+def _motion_tabs(move: Move) -> list[PlotTab]:
+    """Return the tabs of positions, rates, torque parts, power, and forces at pins and mount."""
+    boom, trajectory = move.boom, move.trajectory
+    tabs = [
+        PlotTab("Positions", joint_plots.position_plots(boom, trajectory)),
+        PlotTab("Velocities", joint_plots.velocity_plots(boom, trajectory)),
+        PlotTab("Accelerations", joint_plots.acceleration_plots(boom, trajectory)),
+        PlotTab("Torque parts", list(joint_plots.part_bundles(move.parts))),
+        PlotTab("Power", list(joint_plots.power_bundles(joint_powers(move.sampled)))),
+        PlotTab("Pins and mount", list(joint_plots.load_bundles(boom.mount, move.loads))),
+    ]
+    return [tab for tab in tabs if tab.plots]
+
+
+def _drive_tabs(move: Move) -> list[PlotTab]:
+    """Return the tabs of margins, motors, gearboxes and the tip; none without a drive."""
+    tabs = [
+        PlotTab("Margins", list(drive_plots.margin_bundles(move))),
+        PlotTab("Motors", list(drive_plots.motor_bundles(move))),
+        PlotTab("Gearboxes", list(drive_plots.gearbox_bundles(move))),
+    ]
+    driven = any(tab.plots for tab in tabs)
+    return [tab for tab in tabs if tab.plots] + ([PlotTab("Tip", [drive_plots.tip_bundle(move)])] if driven else [])

@@ -16,13 +16,13 @@ from planner.recording.joint_plots import MOST_RATIO
 from planner.recording.layout import eye_of, scene, shown_beside, text
 from planner.recording.legend import legend_view, log_legend
 from planner.recording.palette import LIMIT_COLOR, MOVE_COLORS
-from planner.recording.plots import Plot, log_curves
+from planner.recording.plots import HIDDEN, Plot, log_curves
 from planner.recording.scene import Place, ground_level, log_motion, log_mount, log_path, log_sticks, log_surroundings
 from planner.recording.stream import log_markdown, save
 from planner.recording.torque_ratio import torque_ratios, worst_ratio
 
 
-def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: str) -> None:
+def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: str, title: str = "") -> None:
     """Write several moves into one recording, each in its own colour, with a blueprint.
 
     /world/moves/<name>/<body>   pose of the body over time (frame "<name> <body>" in "mount");
@@ -40,6 +40,7 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
         path: the .rrd file.
         moves: the moves by name.
         reading: description of the comparison in Markdown.
+        title: what moves where, for the first tab; may be empty.
 
     Raises:
         InputError: no move is given, a move is on a vehicle, or the file cannot be written. An
@@ -54,25 +55,26 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
     legend = [*colors.items(), ("limit", LIMIT_COLOR)]
     tips = {name: forward_kinematics(move.boom, move.trajectory.q).position for name, move in moves.items()}
     reached = np.concatenate(list(tips.values()))
+    curves = {name: _tabs(move) for name, move in moves.items()}
     shared = _tabs(longest)
     known = {name: worst_ratio(torque_ratios(m.boom, m.trajectory, m.loads.tau)) for name, m in moves.items()}
     ratios = {name: np.minimum(ratio, MOST_RATIO) for name, ratio in known.items() if ratio is not None}
 
     def log(recording: rr.RecordingStream) -> None:
-        title = f"largest torque / limit of all drives, up to {MOST_RATIO:g} [-]"
-        ratio = rrb.TimeSeriesView(origin="/plots/ratio", name=title)
-        torques, *others = (_grid(name, tab) for name, tab in shared.items())
-        driven = rrb.Vertical(ratio, torques, row_shares=[1, 3], name="Torques") if ratios else torques
-        right = rrb.Tabs(text("reading", "Answer"), driven, rrb.Tabs(*others, active_tab=0, name="Motion"), active_tab=0)
+        name = f"largest torque / limit of all drives, up to {MOST_RATIO:g} [-]"
+        ratio = [rrb.TimeSeriesView(origin="/plots/ratio", name=name, plot_legend=HIDDEN)] if ratios else []
+        first = rrb.Vertical(text("reading", "Answer"), *ratio, name="Answer")
+        torques, *others = (_grid(name, tab, [each[name] for each in curves.values()]) for name, tab in shared.items())
+        right = rrb.Tabs(first, torques, rrb.Tabs(*others, active_tab=0, name="Motion"), active_tab=0)
         view = scene(
             "Booms [m]",
             eye_of(longest.boom, *(move.trajectory.q for move in moves.values())),
             ground_level(longest.boom, reached),
         )
         left = rrb.Vertical(view, legend_view("Colours"), row_shares=[8, 1])
-        recording.send_blueprint(shown_beside(left, right, [1, 1]))
+        recording.send_blueprint(shown_beside(left, right, [2, 3]))
         log_legend(recording, legend)
-        log_markdown(recording, "reading", reading)
+        log_markdown(recording, "reading", f"# {title}\n\n{reading}" if title else reading)
         log_mount(recording, longest.trajectory.t, None)
         log_surroundings(recording, longest.boom, reached)
         for tab in shared.values():
@@ -84,7 +86,7 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
             log_sticks(recording, move.boom, place, color)
             log_motion(recording, move.boom, t, move.trajectory.q, place)
             log_path(recording, place.of("tip_path"), tips[name], color)
-            for plot in (plot for tab in _tabs(move).values() for plot in tab):
+            for plot in (plot for tab in curves[name].values() for plot in tab):
                 entity = f"{plot.entity}{rr.new_entity_path([name])}"
                 log_curves(recording, entity, t, [f"{name} [{plot.unit}]"], [color], plot.values[:, None])
             if name in ratios:
@@ -96,14 +98,18 @@ def write_moves_recording(path: str | Path, moves: Mapping[str, Move], reading: 
     save(path, f"{longest.boom.name}: {', '.join(moves)}", log)
 
 
-def _grid(name: str, plots: list[Plot]) -> rrb.Grid:
-    """Return a tab of plots without legends, which would cover the curves.
-
-    One legend for all of them is shown below the scene.
-    """
-    no_legend = rrb.PlotLegend(visible=False)
-    views = [rrb.TimeSeriesView(origin=f"/{plot.entity}", name=plot.title, plot_legend=no_legend) for plot in plots]
-    return rrb.Grid(*views, grid_columns=2, name=name)
+def _grid(name: str, plots: list[Plot], moves: list[list[Plot]]) -> rrb.Grid:
+    """Return a tab of plots; their legend is shown below the scene."""
+    views = [
+        rrb.TimeSeriesView(
+            origin=f"/{plot.entity}",
+            name=plot.view_title,
+            plot_legend=HIDDEN,
+            axis_y=plot.scale(move[k].values for move in moves),
+        )
+        for k, plot in enumerate(plots)
+    ]
+    return rrb.Grid(*views, grid_columns=3, name=name)
 
 
 def _tabs(move: Move) -> dict[str, list[Plot]]:
@@ -114,7 +120,7 @@ def _tabs(move: Move) -> dict[str, list[Plot]]:
     boom, trajectory = move.boom, move.trajectory
     torques = joint_plots.torque_plots(boom, trajectory, move.loads.tau)
     return {
-        "Torques": [replace(plot, limits={}) for plot in torques],
+        "Torques": [replace(plot, limits={}, without=plot.without or "limits: see Answer") for plot in torques],
         "Positions": joint_plots.position_plots(boom, trajectory),
         "Velocities": joint_plots.velocity_plots(boom, trajectory),
         "Accelerations": joint_plots.acceleration_plots(boom, trajectory),

@@ -1,6 +1,6 @@
 """Curves over time: their data, their views and how they are logged."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,11 @@ from boom_model.arrays import Array
 from boom_model.boom import IS_LENGTH
 from planner.recording.palette import LIMIT_COLOR, Color
 from planner.recording.stream import time_column
+
+_FEW, _BESIDE = (2.0, 5.0), 0.03
+
+HIDDEN = rrb.PlotLegend(visible=False)
+"""A plot's own legend would cover its curves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +51,7 @@ class Plot:
     @property
     def limit_titles(self) -> list[str]:
         """Name, unit and, if it is not printed in a source, basis of each limit."""
-        mark = "" if self.basis is Basis.PRINTED else f" ({self.basis})"
-        return [f"{name} [{self.unit}]{mark}" for name in self.limits]
+        return [f"{name} [{self.unit}]{_mark(self.basis)}" for name in self.limits]
 
     def log(self, recording: rr.RecordingStream, t: Array) -> None:
         """Log the curve and its limits at times t (n,)."""
@@ -65,11 +69,18 @@ class Plot:
             log_curves(recording, f"{self.entity}/limits", times, self.limit_titles, colors, values, style_of=t)
 
     @property
+    def legend(self) -> list[tuple[str, Color]]:
+        """Name and colour of the limits; the title names the curve."""
+        return [(f"limits{_mark(self.basis)}", LIMIT_COLOR)] if self.limits else []
+
+    @property
     def view(self) -> rrb.TimeSeriesView:
-        """View of the curve, with the legend in the corner that the curve leaves free."""
-        first, second = self.values[: len(self.values) // 2 + 1], self.values[len(self.values) // 2 :]
-        corner = rrb.Corner2D.LeftBottom if first.min() > second.min() else rrb.Corner2D.RightBottom
-        return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.view_title, plot_legend=corner)
+        """View of the curve and its limits; its legend is drawn beside it."""
+        return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.view_title, plot_legend=HIDDEN, axis_y=self.scale(()))
+
+    def scale(self, others: Iterable[Array]) -> rrb.ScalarAxis | None:
+        """Return the axis for the curve, its limits and other moves' curves; see `scale_of`."""
+        return scale_of([self.values, *map(np.asarray, self.limits.values()), *others])
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +99,31 @@ class Bundle:
         log_curves(recording, self.entity, t, self.names, self.colors, self.values)
 
     @property
+    def legend(self) -> list[tuple[str, Color]]:
+        """Names without units, and colours; none for a single curve, which the title names."""
+        names = [name.partition(" [")[0] for name in self.names]
+        return list(dict.fromkeys(zip(names, self.colors, strict=True))) if len(self.names) > 1 else []
+
+    @property
     def view(self) -> rrb.TimeSeriesView:
-        """View of all the curves."""
-        return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.title)
+        """View of all the curves; their legend is drawn beside it."""
+        return rrb.TimeSeriesView(origin=f"/{self.entity}", name=self.title, plot_legend=HIDDEN, axis_y=scale_of([self.values]))
+
+
+def scale_of(values: Sequence[Array]) -> rrb.ScalarAxis | None:
+    """Return an axis between multiples of a power of ten; None where the viewer's own will do.
+
+    The viewer numbers powers of ten only. A range of 2 to 5 of them has one or two numbers, if the
+    plot is not tall; a range that starts and ends with one has at least four.
+    """
+    low, high = min(float(each.min()) for each in values), max(float(each.max()) for each in values)
+    if not (np.isfinite([low, high]).all() and high > low):
+        return None
+    step = 10.0 ** np.floor(np.log10(high - low))
+    if not _FEW[0] <= (high - low) / step < _FEW[1]:
+        return None
+    ends = step * np.array([np.floor(low / step), np.ceil(high / step)])
+    return rrb.ScalarAxis(range=ends + _BESIDE * np.ptp(ends) * np.array([-1.0, 1.0]))
 
 
 def log_curves(
@@ -109,6 +142,10 @@ def log_curves(
     style = rr.SeriesLines if len(t if style_of is None else style_of) > 1 else rr.SeriesPoints
     recording.log(entity, style(names=names, colors=colors), static=True)
     recording.send_columns(entity, [time_column(t)], rr.Scalars.columns(scalars=values))
+
+
+def _mark(basis: Basis) -> str:
+    return "" if basis is Basis.PRINTED else f" ({basis})"
 
 
 def for_people(joint: int, values: Array) -> Array:

@@ -178,11 +178,13 @@ def log_height(recording: rr.RecordingStream, boom: Boom, t: Array, tip: Array) 
 
 
 def log_vehicle(recording: rr.RecordingStream, ground: float, label: str) -> None:
-    """Log a vehicle on wheels behind the mount."""
-    low, high = np.array([-2.4, -0.8, ground + 0.55]), np.array([0.25, 0.8, -0.02])
+    """Log a vehicle on wheels behind the mount; its bracket leaves the mount's force in sight."""
+    low, high = np.array([-2.7, -0.8, ground + 0.55]), np.array([-0.25, 0.8, -0.02])
+    bracket = np.array([[-0.25, -0.2, -0.06], [0.2, 0.2, -0.02]])
+    parts = np.array([[low, high], bracket])
     body = rr.Boxes3D(
-        centers=[(low + high) / 2.0], half_sizes=[(high - low) / 2.0], colors=[_METAL], fill_mode="solid",
-        labels=[f"vehicle, {label}"], show_labels=False,
+        centers=parts.mean(axis=1), half_sizes=np.diff(parts, axis=1)[:, 0] / 2.0, colors=[_METAL], fill_mode="solid",
+        labels=[f"vehicle, {label}"] * 2, show_labels=False,
     )  # fmt: skip
     recording.log("world/vehicle", body, rr.CoordinateFrame("mount"), static=True)
     radius = 0.5

@@ -11,7 +11,7 @@ from rerun.blueprint import encodings
 from boom_model import JOINTS
 from boom_model.arrays import Array
 from planner.planning import Move
-from planner.recording.palette import BLUE, GREEN, GREY, ORANGE, SKY_BLUE, VERMILION, Color
+from planner.recording.palette import GREEN, GREY, ORANGE, SKY_BLUE, VERMILION, Color
 from planner.recording.torque_ratio import torque_ratios
 
 AT_LIMIT = 0.99
@@ -64,15 +64,15 @@ def phases(move: Move) -> list[str]:
 
 
 def active_limits(move: Move) -> list[str]:
-    """Return the joint and limit that the motion is nearest to at each sample, and none below AT_LIMIT."""
+    """Return the limit that the motion is nearest to at each sample, and none below AT_LIMIT."""
     motion, limits = move.trajectory, move.boom.limits
     rates = {"velocity": motion.qd / limits.velocity, "acceleration": motion.qdd / limits.acceleration}
     if motion.qddd is not None:
         rates["jerk"] = motion.qddd / limits.jerk
-    names = [f"{joint} {name}" for name in rates for joint in JOINTS]
+    names = [f"{name} of {joint}" for name in rates for joint in JOINTS]
     ratios = [np.abs(ratio) for ratio in rates.values()]
     drives = torque_ratios(move.boom, motion, move.loads.tau)
-    names += [f"{joint} drive torque" for joint in drives]
+    names += [f"drive torque of {joint}" for joint in drives]
     every = np.concatenate([*ratios, *(ratio[:, None] for ratio in drives.values())], axis=-1)
     worst = np.round(every, _ALIKE).argmax(axis=-1)  # of limits met together the first, not by rounding
     met = every.max(axis=-1) >= AT_LIMIT
@@ -96,11 +96,11 @@ def log_events(recording: rr.RecordingStream, move: Move, shown: Sequence[Lane])
     t, (limits,) = move.trajectory.t, [lane.states for lane in shown if lane.entity == _LIMIT]
     for k in _changes(limits):
         if limits[k] != _NO_LIMIT:
-            _log_entry(recording, float(t[k]), f"{limits[k]} reaches its limit", BLUE)
+            _log_entry(recording, float(t[k]), f"{limits[k]} reaches its limit", SKY_BLUE)
     stop = move.stop
     if stop is not None:
-        _log_entry(recording, stop.time_at_s, f"the longest stop would begin here: {stop.time_s:.2f} s", ORANGE)
-        _log_entry(recording, stop.distance_at_s, f"the farthest stop would begin here: {stop.distance_m:.2f} m", ORANGE)
+        _log_entry(recording, stop.time_at_s, f"the longest stop would begin: {stop.time_s:.2f} s", ORANGE)
+        _log_entry(recording, stop.distance_at_s, f"the farthest stop would begin: {stop.distance_m:.2f} m of the tip", ORANGE)
     recording.reset_time()
 
 
@@ -112,7 +112,7 @@ def states_view() -> rrb.StateTimelineView:
 def events_view() -> rrb.TextLogView:
     """Return the view of the entries."""
     columns = rrb.TextLogColumns(
-        timeline_columns=[encodings.TimelineColumn("t")],
+        timeline_columns=[encodings.TimelineColumn("t", visible=False)],  # it is too narrow for a time
         text_log_columns=[encodings.TextLogColumn(encodings.TextLogColumnKind.Body)],
     )
     return rrb.TextLogView(origin="/events", name="Where limits are met", columns=columns)
@@ -129,4 +129,4 @@ def _changes(states: Sequence[str]) -> list[int]:
 
 def _log_entry(recording: rr.RecordingStream, at: float, text: str, color: Color) -> None:
     recording.set_time("t", duration=at)
-    recording.log("events", rr.TextLog(text, level=rr.TextLogLevel.INFO, color=color))
+    recording.log("events", rr.TextLog(f"{at:.2f} s: {text}", level=rr.TextLogLevel.INFO, color=color))

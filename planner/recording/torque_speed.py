@@ -19,7 +19,7 @@ WIDTH = 1.6
 """Width of a plane whose height is 1; y points down."""
 
 _RPM = 30.0 / np.pi
-_TICKS = 5
+_TICKS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,7 @@ def log_plane(recording: rr.RecordingStream, t: Array, plane: Plane) -> None:
         look = rr.LineStrips2D([points], colors=[color], radii=rr.Radius.ui_points(width))
         recording.log(f"{plane.entity}/{name}", look, static=True)
         if label is not None:
-            _text(recording, f"{plane.entity}/{name}/name", points[len(points) // 3] - [0.0, 0.05], label)
+            _text(recording, f"{plane.entity}/{name}/name", points[len(points) // 3] - [0.0, 0.12], label)
 
     for axis, most, unit in ((0, plane.most[0] * _RPM, "rpm"), (1, plane.most[1], "Nm")):
         for k, value in enumerate(np.arange(0.0, most, _step(most))):

@@ -16,6 +16,9 @@ JOINT_HEADER = ("joint", "load", "tightest limit", "used", "at", "gearbox", "mot
 """Columns of `joint_table`. *Used*, gearbox and motor are the demand, with its required
 margin, divided by the limit."""
 
+_MOST_NAMED = 4
+"""Failed checks that the sentence names; the rest are counted."""
+
 
 @dataclass(frozen=True)
 class Answer:
@@ -111,7 +114,9 @@ def _failed(report: Report) -> str:
     failed = [f"{row.joint} {row.check}" for row in report.rows if row.verdict is Verdict.FAIL]
     if report.certificate is not None:
         failed += [f"{worst.joint} {worst.limit} (certificate)" for worst in report.certificate.broken]
-    return _listed(dict.fromkeys(failed)) if failed else ""
+    names = list(dict.fromkeys(failed))
+    more = [f"{len(names) - _MOST_NAMED} more"] if len(names) > _MOST_NAMED + 1 else []
+    return _listed([*names[:_MOST_NAMED], *more] if more else names) if names else ""
 
 
 def _open(report: Report) -> list[str]:

@@ -256,7 +256,7 @@ def _margins(axes: "Axes", joint: str, rows: Sequence[Row]) -> None:
     axes.axvline(0.0, color=_CURVE, linewidth=0.8)
     axes.set_xlim(-1.05, _LONGEST_BAR + 0.6)
     axes.set_xticks([-1.0, 0.0, 1.0, 2.0, 3.0], ["-100%", "0", "100%", "200%", "300%"])
-    axes.set(title=f"{joint}: margins", xlabel="(limit - demand) / demand; a black tick is the required margin")
+    axes.set(title=f"{joint}: margins", xlabel="(limit - demand) / demand;\na black tick is the required margin")
     legend = [Patch(facecolor=color, label=str(verdict)) for verdict, color in COLORS.items()]
     _legend_below(axes, 4, legend)
     axes.grid(axis="x", alpha=0.25)

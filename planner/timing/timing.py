@@ -162,8 +162,14 @@ def _too_short(
     parts = f" ({_parts(boom, hasty, worst, base)})" if worst.limit in _INSTANT else ""
     return (
         f"duration {asked:g} s is too short: the {timing.profile} profile needs at least {least:.6g} s within the limits; in "
-        f"{asked:g} s {worst.joint} would reach {worst.ratio:.3g} times its {worst.limit} limit{when}{parts}"
+        f"{asked:g} s {_exceeded(worst)}{when}{parts}"
     )
+
+
+def _exceeded(worst: WorstRatio) -> str:
+    if np.isfinite(worst.ratio):
+        return f"{worst.joint} would reach {worst.ratio:.3g} times its {worst.limit} limit"
+    return f"{worst.joint} would be too fast for its motor to give any torque"
 
 
 _INSTANT = ("gearbox torque", "motor torque", "motor torque at standstill")

@@ -331,11 +331,11 @@ def test_quiet_prints_nothing_but_json_and_complaints(boom):
 def test_mission_checks_a_whole_cycle(boom, tmp_path):
     code, out, err = boom("mission", "field-day", "--picture", "drives.png", "--report", "day.md")
     assert (code, err) == (0, "")
-    assert sorted(os.listdir(tmp_path)) == ["day-1.png", "day-2.png", "day-3.png", "day.md", "drives.png"]
+    assert sorted(os.listdir(tmp_path)) == ["day-1.png", "day-2.png", "day-3.png", "day-4.png", "day.md", "drives.png"]
     assert "mission field day" in out
     assert "20 x to tip=-1,1.7,0.9 along line" in boom("mission", "field-day", "--all")[1]
     assert (tmp_path / "drives.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "day.md").read_text().startswith("# INCOMPLETE")
+    assert (tmp_path / "day.md").read_text().startswith("# Mission field day\n\n4615.751 s, payload 10 kg, level ground\n")
     code, out, _ = boom("mission", "field-day", "--json")
     answer = json.loads(out)
     assert answer["profile"] == "mission field day"
@@ -346,6 +346,11 @@ def test_missions_stand_side_by_side(boom, tmp_path):
     code, out, _ = boom("mission", "table-2-4", "table-3-1", "--joint", "inner", "--report", "both.md")
     assert code == 0
     assert "table 3-1: INCOMPLETE" in out
+    assert re.findall(r"^(yaw|inner|lower|extension|wrist|mount|tip) ", out, flags=re.MULTILINE) == ["inner"]
+    assert len(out.splitlines()) <= 24
+    listed = boom("mission", "table-2-4", "table-3-1", "--joint", "inner", "--all")[1]
+    assert "gearbox" in listed
+    assert len(listed.splitlines()) > len(out.splitlines())
     assert "table 2-4: demand of limit" in (tmp_path / "both.md").read_text()
     code, out, _ = boom("mission", "table-2-4", "table-3-1", "--json")
     assert sorted(json.loads(out)["missions"]) == ["table 2-4", "table 3-1"]

@@ -1,5 +1,4 @@
-"""Forty plausible mistakes: what was typed, and the one line that comes back; it names what to type
-instead."""
+"""Plausible mistakes: what was typed, and the line that names what to type instead."""
 
 import numpy as np
 import pytest
@@ -38,14 +37,34 @@ MISTAKES = [
     ("ik 1.4 0 1.0 --constrain horizontal", "Did you mean '--constraint'?"),
     ("check motion.csv --paylod 8", "Did you mean '--payload'?"),
     ("validate --jason", "Did you mean '--json'?"),
-    ("plan phenotyping", "Missing argument 'GOAL'."),
-    ("ik 1.4 0", "Missing argument 'Z'."),
+    ("plan transport phenotyping -payload 8", "No such option '-payload'. Did you mean '--payload'?"),
+    ("plan phenotyping", "Missing argument 'GOAL'; it is called as boom plan START GOAL"),
+    ("plan transport phenotyping home", "unexpected extra argument (home); it is called as boom plan START GOAL"),
+    ("ik 1.4 0", "Missing argument 'Z'; it is called as boom ik X Y Z"),
+    ("mission", "it is called as boom mission MISSION..."),
+    ("compare motion.csv", "Missing argument 'MEASURED'; it is called as boom compare PLANNED MEASURED"),
+    ("torque motion.csv", "Missing option '--out'; it is called as boom torque IN --out OUT"),
+    ("plan transport phenotyping --profile all", "unknown profile 'all'; there are: cubic, quintic"),
+    ("plan transport phenotyping --via", "Option '--via' requires an argument"),
+    ("plan transport phenotyping --average-torque", "average_torque is for the time-optimal profile, not for cubic"),
+    ("plan transport phenotyping --via-velocity 1,2,3,4,5", "via velocity: 1 given for 0 via; give one for each"),
     # units
     ("link --deflection 10", "deflection is 10 m; it must be between 1e-06 and 1 m"),
     ("plan transport tip=1400,0,1000", "the nearest point on the line to the base that can be reached"),
     ("plan transport phenotyping --payload 10kg", "'10kg' is not a valid float"),
     ("plan transport phenotyping --payload -8", "payload"),
-    ("plan q=0,90,180,0 transport", "'q=0,90,180,0' has 4 numbers; it needs 5"),
+    ("plan q=0,90,180,0 transport", "'q=0,90,180,0' has 4 numbers; it needs 5, separated by commas"),
+    ("plan q=0;90;180;0;0 transport", "'q=0;90;180;0;0' has 1 number; it needs 5, separated by commas"),
+    ("plan 0,90,180,0,0 transport", "numbers are given as q=DEG,DEG,DEG,M,DEG or tip=X,Y,Z"),
+    ("plan transport 1.4,0,1.0", "'1.4,0,1.0' is not the name of a pose; numbers are given as tip=1.4,0,1.0"),
+    ("ik 1.4,0,1.0", "1.4,0,1.0: X Y Z are three numbers apart, such as 1.4 0 1.0"),
+    ("plan transport tip=1.4,0,1 --constraint extension=0,25", "constraint extension: '0,25' is not metres"),
+    ("plan transport tip=1.4,0,1 --constraint extension", "did you mean extension=M?"),
+    ("plan transport tip=1.4,0,1 --pitch horizontal", "'horizontal' is not down, level, up, free or degrees"),
+    ("plan transport phenotyping --along arc", "unknown along 'arc'; there are: joint, line, arc=X,Y,Z"),
+    ("plan transport phenotyping --along line", "a line or an arc of the tip connects tip targets"),
+    ("size table-3-1 --voltage 0", "voltage is 0 V; it must be between 0.1 and 1000 V"),
+    ("link --thickness 5", "thickness is 5 m; it must be between 1e-05 and 1 m"),
     ("plan q=0,1.57,3.14,0,0 transport", "lower 3.14 deg is 1.86 deg below its limit of 5 deg"),
     ("check degrees.csv", "degrees.csv: q looks like degrees: q1 (yaw) reaches 90; angles must be in rad"),
     ("check degrees-of-q.csv", "degrees-of-q.csv: q looks like degrees; it must be in rad"),
@@ -62,6 +81,16 @@ MISTAKES = [
     ("export-model boom.sdf", "must end in .urdf, or in .xml for MuJoCo"),
     ("export motion.csv move.json5", "must end in one of .csv, .parquet, .yaml, .yml, .json"),
     ("new mine", "mine: the name must end in .toml"),
+    ("check semicolons.csv", "semicolons.csv: its columns are separated by semicolons; a motion's CSV has commas"),
+    (
+        "check old/a.rrd",
+        "old/a.rrd: a recording is not read back; boom plan START GOAL --csv FILE.csv writes the motion of a plan",
+    ),
+    ("check wrong-motor.toml", "wrong-motor.toml: not a motion; it is the file of a boom, a vehicle or a mission"),
+    ("mission wrong-motor.toml", "wrong-motor.toml: this is the file of a boom; give it as --boom wrong-motor.toml"),
+    ("plan transport phenotyping --vehicle wrong-motor.toml", "give it as --boom wrong-motor.toml"),
+    ("mission motion.csv", "unknown mission 'motion.csv'; there are: field-day, table-2-4, table-3-1, or a FILE.toml"),
+    ("torque motion.csv --out motion.csv", "motion.csv: cannot be written: the same command reads it"),
     # order
     ("fk tip=1.4,0,1.0", "boom ik X Y Z finds those that reach it"),
     ("check transport phenotyping", "Got unexpected extra argument"),
@@ -84,6 +113,9 @@ def folder(tmp_path_factory):
     write(place / "milliseconds.csv", 1e3 * good.t, q, good.qd, good.qdd)
     write(place / "bare-milliseconds.csv", np.rint(1e3 * good.t), q)
     write(place / "millimetres.csv", good.t, np.where(length, 1e3 * q, q))
+    (place / "semicolons.csv").write_text("t;q1;q2;q3;q4;q5\n0;0;0;1;0;0\n1;0;0;1;0;0\n")
+    (place / "old").mkdir()
+    (place / "old" / "a.rrd").write_bytes(b"RRF2\x00\xff, not text\nat all")
     (place / "wrong-motor.toml").write_text(BOOM_FILE.read_text().replace("MST342C02", "MST341B2"))
     return place
 
@@ -113,6 +145,7 @@ def test_a_mistake_is_named_in_one_line(boom, folder, monkeypatch, typed, said):
         ("plan transport phenotyping --pitch level", "note: --pitch has no effect: no target is a tip=X,Y,Z"),
         ("plan transport tip=1.4,0,1 --pitch -1.5708", "note: pitch -1.5708 is in degrees; -1.5708 rad would be -90"),
         ("ik 1.4 0 1 --pitch -0.785", "note: pitch -0.785 is in degrees; -0.785 rad would be -45"),
+        ("plan transport phenotyping --pass-via", "note: --pass-via has no effect: no --via is given"),
         ("size table-3-1 --joint inner", "not tried: gearbox CSF-20-50-2UH and 24 more: no efficiency, no-load torque"),
     ],
 )
@@ -130,3 +163,25 @@ def test_a_file_that_is_replaced_is_named_as_replaced(boom):
 def test_a_motion_in_si_is_no_mistake(boom, folder, monkeypatch):
     monkeypatch.chdir(folder)
     assert boom("check", "motion.csv")[0] == 0
+
+
+@pytest.mark.parametrize("width", [80, 140])
+@pytest.mark.parametrize("payload", ["40", "1000"])
+def test_an_answer_that_is_no_is_short_too(boom, monkeypatch, width, payload):
+    monkeypatch.setenv("COLUMNS", str(width))
+    code, out, err = boom(*PLAN, "--payload", payload, "--vehicle", "slope")
+    assert code == 1
+    assert len(out.splitlines()) <= 24
+    assert "FAIL gearbox hold: inner" in out
+    assert " more that FAIL or WARN\n" in out
+    assert len(err) < 200
+    listed = boom(*PLAN, "--payload", payload, "--vehicle", "slope", "--all")[1]
+    assert "more that FAIL" not in listed
+    assert listed.count("\nFAIL ") > out.count("\nFAIL ")
+
+
+def test_a_duration_beyond_all_torque_is_told_in_words(boom):
+    code, _, err = boom(*PLAN, "--duration", "0.1")
+    assert code == 1
+    assert "lower would be too fast for its motor to give any torque" in err
+    assert "inf" not in err

@@ -24,6 +24,8 @@ COMMANDS = (
     "boom check move.csv --payload 8",
     "boom mission field-day",
     "boom mission table-2-4 table-3-1",
+    "boom mission table-2-4 table-3-1 --joint inner --joint lower",
+    "boom plan transport phenotyping --payload 40 --vehicle slope",
     "boom size field-day --joint inner --joint lower",
     "boom require table-3-1",
     "boom control transport phenotyping",

@@ -221,8 +221,13 @@ def test_the_recording_holds_every_case(found, tmp_path):
     write_control_recording(path, found)
     entities = recorded_entities(path)
     for row in found.rows:
-        name = f"/cases/{row.profile}/{row.controller}/{row.shaper}"
-        assert {f"{name}/{kind}/{joint}" for kind in ("q", "error", "tau") for joint in JOINTS} <= entities
+        place = f"{row.profile}/{row.shaper}"
+        assert {f"/{kind}/{place}/{joint}" for kind in ("error", "torque") for joint in JOINTS} <= entities
     assert {"/report", "/pictures/loops", "/pictures/errors", "/world/boom/tip"} <= entities
+    torque = np.array(recorded_rows(path, "/torque/cubic/none/inner", "Scalars:scalars"))
+    np.testing.assert_array_equal(torque[:, :2], found.run.torque[::5, :2, 1])
+    np.testing.assert_array_equal(torque[:, 2], found.run.limit[::5, :2, 1].min(axis=1))
+    error = recorded_rows(path, "/error/cubic/none/inner", "Scalars:scalars")
+    np.testing.assert_array_equal(error, np.degrees(found.run.q - found.run.command)[::5, :2, 1])
     values = recorded_rows(path, "/tip_error/cubic/none", "Scalars:scalars")
     np.testing.assert_array_equal(values, 1e3 * found.tip_error[::5, :2])

@@ -177,7 +177,7 @@ def test_scan(boom, tmp_path):
 
 
 @pytest.mark.parametrize(("options", "code", "message"), [
-    (("--footprint", "0.5"), 2, "has 1 numbers; it needs 2"),
+    (("--footprint", "0.5"), 2, "has 1 number; it needs 2"),
     (("--footprint", "0,0.5"), 2, "footprint is 0 m"),
     (("--footprint", "0.5,0.5", "--speed", "3"), 1, "1.8 m/s is the fastest"),
     (("--footprint", "0.5,0.5", "--offset", "9"), 1, "no plot can be reached"),

@@ -253,6 +253,31 @@ def test_a_step_that_cannot_be_done_is_named(mission, steps, kind, said):
     assert said in str(error.value)
 
 
+TILTED = 'pitch = "-60"\nconstraint = "extension=0.6"\n'
+
+
+@pytest.mark.parametrize("along", ["joint", "line"])
+def test_pitch_and_constraint_of_a_mission_are_those_of_its_steps(tmp_path, along):
+    steps = f'[[steps]]\nto = "tip=-0.5,1.6,1.0"\nalong = "{along}"\n'
+    head = 'name = "tilted"\nbasis = "assumed"\nsource = "this test"\nstart = "tip=0.5,1.6,1.0"\n'
+    (tmp_path / "m.toml").write_text(head + TILTED + steps)
+    cycle = plan_cycle(BOOM, load_mission(str(tmp_path / "m.toml")))
+    q = cycle.trajectory.q[[0, -1]]
+    tip = forward_kinematics(BOOM, q)
+    np.testing.assert_allclose(tip.position, [[0.5, 1.6, 1.0], [-0.5, 1.6, 1.0]], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.degrees(tip.pitch), -60.0, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(q[:, 3], 0.6, rtol=0, atol=1e-9)
+
+
+def test_a_step_may_have_a_pitch_and_a_constraint_of_its_own(tmp_path):
+    steps = '[[steps]]\nto = "tip=-0.5,1.6,1.0"\npitch = "-45"\nconstraint = "extension=0.7"\n'
+    head = 'name = "tilted"\nbasis = "assumed"\nsource = "this test"\nstart = "tip=0.5,1.6,1.0"\n'
+    (tmp_path / "m.toml").write_text(head + TILTED + steps)
+    q = plan_cycle(BOOM, load_mission(str(tmp_path / "m.toml"))).trajectory.q
+    np.testing.assert_allclose(q[[0, -1], 3], [0.6, 0.7], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(np.degrees(forward_kinematics(BOOM, q[[0, -1]]).pitch), [-60.0, -45.0], rtol=0, atol=1e-7)
+
+
 def test_a_line_from_another_branch_is_refused(mission):
     steps = '[[steps]]\nto = "tip=1,1.7,0.9"\nconstraint = "extension=0.6"\n[[steps]]\nto = "tip=-1,1.7,0.9"\nalong = "line"\n'
     with pytest.raises(

@@ -378,6 +378,8 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
         "/report",
     }
     others |= {"/answer", "/states", "/events"}
+    strips = ["torques", "positions", "velocities", "accelerations", r"torque\ parts", "power", r"pins\ and\ mount"]
+    others |= {f"/legends/{strip}" for strip in [*strips, "margins", "motors", "gearboxes", "tip"]}
     assert sorted(origins) == sorted(plots | others)
     classes = [row[0] for row in shown["ViewBlueprint:class_identifier"]]
     assert sorted(set(classes)) == ["2D", "3D", "StateTimeline", "TextDocument", "TextLog", "TimeSeries"]
@@ -388,7 +390,7 @@ def test_blueprint_shows_everything(which: str, request: pytest.FixtureRequest):
         assert (
             names[plot].removesuffix(", no drive limits it") == curves[0]
             if len(curves) == 1 and "/power/" not in plot
-            else re.search(r"\[(N|Nm|W|mm|%|-)\]$", names[plot])
+            else re.search(r"\[(N|Nm|W|mm|%|-)\](, no (limit|drive) is given)?$", names[plot])
         )
     tabs = {row[0] for row in shown["ContainerBlueprint:display_name"]}
     joints, drives = (

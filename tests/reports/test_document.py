@@ -8,17 +8,20 @@ from html.parser import HTMLParser
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pypdf
 import pytest
 
-from boom_model import Boom, InputError
+from boom_model import JOINTS, Boom, InputError
 from planner import plan
-from planner.motion.trajectory import write_csv
+from planner.motion.trajectory import Trajectory, write_csv
 from planner.reports.document import write_document
 from planner.reports.drive_pictures import drive_pages
+from planner.reports.first_page import first_picture
 from planner.reports.move_pictures import move_pictures
 from planner.reports.report import cells
 
+BOOM = Boom.load()
 PNG = b"\x89PNG\r\n\x1a\n"
 TITLES = ["Positions", "Velocities", "Torques", "Drive of inner", "Drive of lower", "Tip"]
 FORMS = ["x.md", "x.html", "x.pdf"]
@@ -172,10 +175,29 @@ def test_the_first_page_is_the_answer(boom, tmp_path):
     assert '<strong class="FAIL">FAIL</strong>' in (tmp_path / "x.html").read_text()
 
 
+def test_the_first_page_of_a_mission(boom, tmp_path):
+    assert boom("mission", "table-2-4", "--payload", "8", "--report", "x.md")[0] == 0
+    first = (tmp_path / "x.md").read_text().partition("## Largest torques")[0]
+    assert re.match(r"# Mission table 2-4\n\n[\d.]+ s, payload 8 kg, level ground\n\n\*\*INCOMPLETE\*\*: nothing fails;", first)
+    assert all(f"\n| {joint} | " in first for joint in (*JOINTS, "mount", "tip"))
+
+
+def test_the_picture_of_a_mission_draws_its_moves_one_after_the_other():
+    t = np.array([0.0, 1.0, 2.0, 900.0, 901.0])
+    q = np.tile(BOOM.poses["transport"], (5, 1))
+    q[2:4, 0] += 1.0
+    motion, tau = Trajectory(t, q, np.zeros((5, 5)), np.zeros((5, 5))), np.arange(25.0).reshape(5, 5)
+    side, _, torques = first_picture(BOOM, motion, tau, [slice(0, 3), slice(3, 5)]).axes
+    assert [text.get_text() for text in side.get_legend().get_texts()] == ["start", "farthest", "end"]
+    first, second = torques.get_lines()[:2]
+    np.testing.assert_array_equal(first.get_xydata(), [[0.0, 0.0], [1.0, 5.0], [2.0, 10.0]])
+    np.testing.assert_array_equal(second.get_xydata(), [[2.0, 15.0], [3.0, 20.0]])
+
+
 JOBS = {
     "plan": (("plan", "transport", "phenotyping", "--out", "m.rrd"), ["The move", *TITLES], "brake present"),
     "check": (("check", "m.csv"), ["The move", *TITLES], "brake present"),
-    "mission": (("mission", "table-3-1"), TITLES[3:], "brake present"),
+    "mission": (("mission", "table-3-1"), ["The move", *TITLES[3:]], "brake present"),
     "missions": (
         ("mission", "table-2-4", "table-3-1", "--joint", "inner"),
         [f"table {n}: {title}" for n in ("2-4", "3-1") for title in TITLES[3:]],
