@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from planner.motion.trajectory import Trajectory
 
 _Command = Callable[..., Any]
-_COMPLETE = {"link": links, "material": materials}
+_COMPLETE = {"link": links, "links": any_file, "material": materials}
 
 
 def task_options(command: _Command) -> _Command:

@@ -42,7 +42,7 @@ MISTAKES = [
     ("plan transport phenotyping home", "unexpected extra argument (home); it is called as boom plan START GOAL"),
     ("ik 1.4 0", "Missing argument 'Z'; it is called as boom ik X Y Z"),
     ("mission", "it is called as boom mission MISSION..."),
-    ("compare motion.csv", "Missing argument 'MEASURED'; it is called as boom compare PLANNED MEASURED"),
+    ("compare motion.csv", "nothing to compare motion.csv with: give PLANNED before it, or --before FILE.toml"),
     ("torque motion.csv", "Missing option '--out'; it is called as boom torque IN --out OUT"),
     ("plan transport phenotyping --profile all", "unknown profile 'all'; there are: cubic, quintic"),
     ("plan transport phenotyping --via", "Option '--via' requires an argument"),

@@ -207,7 +207,7 @@ def test_single_wrong_samples_are_noticed() -> None:
     log = measured(0).log
     assert log.tau is not None
     wrong = 500.0 * (np.random.default_rng(0).uniform(size=log.tau.shape) < 0.005)
-    notes = identify(BOOM, [readings_of(replace(log, tau=read_only(log.tau + wrong)))], drive_inertia=True).notes
+    notes = identify(BOOM, [readings_of(replace(log, tau=read_only(log.tau + wrong)))], drive_inertia=True).warnings
     assert any("stays unexplained of" in note and "single wrong samples" in note for note in notes)
     assert not any("stays unexplained" in note for note in identified(0).notes)
 
