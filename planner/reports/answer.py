@@ -5,7 +5,6 @@ Terminal, recording, report and notebook show the same lines.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 
 from boom_model import JOINTS
 from planner.checks.kinds import Margin, Part, Severity
@@ -135,11 +134,13 @@ def _open(report: Report) -> list[str]:
 
 
 def _findings(report: Report) -> Iterable[str]:
-    """Yield a line for each check that FAILs or WARNs, with the numbers of every joint."""
+    """Yield a line for each check that FAILs or WARNs, the worst first."""
     for verdict in (Verdict.FAIL, Verdict.WARN):
-        rows = sorted((row for row in report.rows if row.verdict is verdict), key=lambda row: row.check)
-        for check, same in groupby(rows, key=lambda row: row.check):
-            numbers = [f"{row.joint} {_numbers(row)}" for row in same]
+        checks: dict[str, list[Row]] = {}
+        for row in sorted((row for row in report.rows if row.verdict is verdict), key=lambda row: row.check):
+            checks.setdefault(row.check, []).append(row)
+        for check, rows in sorted(checks.items(), key=lambda each: -max(usage(row) or 0.0 for row in each[1])):
+            numbers = [f"{row.joint} {_numbers(row)}" for row in rows]
             yield f"{verdict} {check}: {', '.join(numbers)}"
 
 
