@@ -385,7 +385,7 @@ class Boom:
         return replace(self, drives=drives, rotors=rotors)
 
     def with_drive_inertia(self, measured: Sequence[Sourced[float]]) -> "Boom":
-        """Return the boom with the measured inertia of each drive at its joint [kg m^2, the extension's kg].
+        """Return the boom with the measured drive inertias at the joints [kg m^2, extension kg].
 
         Raises:
             InputError: an inertia is not plausible.
@@ -398,7 +398,7 @@ class Boom:
 
     @cached_property
     def drive_inertia(self) -> Array:
-        """Inertia of each drive at its joint (5,) [kg m^2, the extension's kg]; 0 where it is unknown."""
+        """Inertia of each drive at its joint (5,) [kg m^2, extension kg]; 0 where it is unknown."""
         known = [reflected_inertia(drive) if drive is not None else rotor and rotor.value
                  for drive, rotor in zip(self.drives, self.rotors, strict=True)]  # fmt: skip
         return read_only([inertia or 0.0 for inertia in known])

@@ -17,7 +17,7 @@ OFFSETS = tuple(f"{joint} offset" for joint in JOINTS)
 SCALE = "extension scale"
 WIND_UPS = tuple(f"{joint} wind-up" for joint in JOINTS)
 PARAMETERS = (*LENGTHS, *OFFSETS, SCALE, *WIND_UPS)
-"""Figures that a calibration can measure: lengths [m], offsets of the readings [rad, m], shares of 1."""
+"""Figures that a calibration can measure: lengths [m], reading offsets [rad, m], shares of 1."""
 
 
 @dataclass(frozen=True, eq=False)

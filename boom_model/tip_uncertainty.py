@@ -1,9 +1,10 @@
-"""Derivatives of the tip by the figures that a calibration measures, and the tip's covariance that follows from theirs.
+"""Derivatives of the tip by the figures of a calibration, and the tip's covariance from theirs.
 
     x = p(q; lengths),    q_i = scale_i reading_i + offset_i - c_i w_i(tau_i)
     cov x = J C J^T,      J = dx / d(lengths, offset, scale, c)
 
-C is the covariance of the calibration and w_i the printed wind-up of a gearbox. What the calibration held counts as exact.
+C is the covariance of the calibration and w_i the printed wind-up of a gearbox. What the
+calibration held counts as exact.
 """
 
 import numpy as np
@@ -21,7 +22,7 @@ _FLAT = 1e-3  # sine of the angle between the linkage's directions, below which 
 
 
 def tip_covariance(boom: Boom, q: ArrayLike, tau: ArrayLike | None = None) -> Array | None:
-    """Return the covariance (..., 3, 3) of the tip in frame 1 [m^2] by what the calibration leaves uncertain.
+    """Return the tip's covariance (..., 3, 3) in frame 1 [m^2] by the calibration's uncertainty.
 
     It is linear in the errors. It is NaN where the linkage is flat and its inequality was measured.
 
@@ -47,9 +48,10 @@ def tip_covariance(boom: Boom, q: ArrayLike, tau: ArrayLike | None = None) -> Ar
 
 
 def tip_deviation(boom: Boom, q: ArrayLike, tau: ArrayLike | None = None) -> Array | None:
-    """Return the standard deviation (...) of the tip [m]: the root of the mean squared distance, sqrt(tr cov x).
+    """Return the standard deviation (...) of the tip [m], sqrt(tr cov x).
 
-    Arguments and errors are those of `tip_covariance`.
+    This is the root of the mean squared distance. Arguments and errors are those of
+    `tip_covariance`.
     """
     covariance = tip_covariance(boom, q, tau)
     return None if covariance is None else np.asarray(np.sqrt(np.trace(covariance, axis1=-2, axis2=-1)))
@@ -78,7 +80,7 @@ def _by_parameters(boom: Boom, q: Array, names: tuple[str, ...], tau: Array | No
 
 
 def printed_wind_up(boom: Boom, q: Array, tau: Array | None = None) -> Array:
-    """Return the wind-up (n, 5) [rad] of each joint by the printed curve of its gearbox; 0 where there is none.
+    """Return the wind-up (n, 5) [rad] of each joint by its gearbox's printed curve; 0 without one.
 
     The torque is `tau` (n, 5), or the static one at q (n, 5).
     """
@@ -91,7 +93,10 @@ def printed_wind_up(boom: Boom, q: Array, tau: Array | None = None) -> Array:
 
 
 def tip_by_joints(boom: Boom, q: Array, arm: Array) -> Array:
-    """Return the derivative (n, 3, 5) by q (n, 5) of a point fixed to frame 11, `arm` (3,) from the tip in that frame [m]."""
+    """Return the derivative (n, 3, 5) by q (n, 5) of a point fixed to frame 11.
+
+    The point is at `arm` (3,) from the tip, in that frame [m].
+    """
     pose, J = forward_kinematics(boom, q), jacobian(boom, q)
     moved: Array = J[:, :3] + np.cross(J[:, 3:], (pose.rotation @ arm)[..., None], axis=1)
     return moved

@@ -62,7 +62,7 @@ ROUND_POST = np.array([np.radians(10), 0.5, 2.6, 0.3, 0.0]), np.array([np.radian
 
 
 def thesis_catalogue() -> Catalogue:
-    """The thesis's four motors and its gearbox out of the shipped catalogue: few enough to try them all."""
+    """The thesis's four motors and its gearbox from the shipped catalogue: few enough to try."""
     shipped = Catalogue.load()
     motors = {name: motor for name, motor in shipped.motors.items() if name.startswith("MST")}
     return replace(shipped, motors=motors, gearboxes={"CBG320160": shipped.gearboxes["CBG320160"]}, actuators={})

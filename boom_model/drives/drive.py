@@ -148,7 +148,7 @@ class Drive:
     brake: Sourced[bool] | None = None
     """Whether a brake holds the joint without power; None if unknown."""
     inertia: Sourced[float] | None = None
-    """Measured inertia of motor and gearbox at the joint [kg m^2]; None is that of the datasheets."""
+    """Measured inertia of motor and gearbox at the joint [kg m^2]; None uses the datasheets."""
 
     @property
     def winding(self) -> Winding | None:

@@ -14,12 +14,12 @@ from boom_model.kinematics.forward import position_jacobian
 from boom_model.tip_uncertainty import tip_deviation
 
 SURE = 2.0
-"""Standard deviations of the geometry that count in the total: at least 95 % of the errors are within."""
+"""Number of standard deviations of the geometry in the total: at least 95 % of the errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class TipDeflection:
-    """Deviation of the tip from the rigid model: by the drives of the joints, and by what a calibration left open."""
+    """Deviation of the tip from the rigid model, by drives and by the calibration's uncertainty."""
 
     wind_up: Array
     """(..., 3) displacement of the tip in frame 1 by the wind-up of the gearboxes [m]."""
@@ -30,13 +30,16 @@ class TipDeflection:
     step: Array
     """(...) largest displacement of the tip by the microstep error of the motors [m]."""
     geometry: Array
-    """(...) standard deviation of the tip by the calibrated figures [m]; 0 if the boom is not calibrated."""
+    """(...) standard deviation of the tip by calibrated figures [m]; 0 without a calibration."""
     uncounted: tuple[str, ...]
     """What is left out because data is missing, one phrase each."""
 
     @property
     def total(self) -> Array:
-        """(...) largest total displacement [m]: the sum of the magnitudes of all parts, of the geometry SURE times."""
+        """(...) largest total displacement [m]: the sum of the magnitudes of all parts.
+
+        The geometry counts `SURE` times.
+        """
         size: Array = np.linalg.norm(self.wind_up, axis=-1)
         return size + self.backlash + self.hysteresis + self.step + SURE * self.geometry
 

@@ -7,7 +7,7 @@ torque of joint i follows from d'Alembert's principle:
 
 The vectors b and their derivatives are linear in nine features of the position:
 
-    f = (1, c2, c3, ct, s2, s3, st, rho c3, rho s3)       c, s: cosine and sine; 2, 3, t, rho as in b
+    f = (1, c2, c3, ct, s2, s3, st, rho c3, rho s3)      c, s: cosine and sine; 2, 3, t, rho as in b
 
 A is linear in the accelerations of joints and base, and in products of two rates. Therefore each
 coefficient of tau is a constant quadratic form in f.
@@ -45,7 +45,7 @@ _FIRST_PAIR = 10
 
 
 class Forms(NamedTuple):
-    """Constant quadratic forms in f (45, 5 k) for k coefficients of each joint torque; payload as mass."""
+    """Constant quadratic forms in f (45, 5 k): k coefficients of each torque; payload as mass."""
 
     inertia: Array
     """k = 5: joint accelerations, the mass matrix."""
@@ -180,5 +180,5 @@ def _by_joint(joint: int) -> Callable[[Array], Array]:
 
 
 def _by_turn(axis: int) -> Callable[[Array], Array]:
-    """Return the derivative of vectors (9, 3, 11) by a turn of the plane about x, z or n: axis x b."""
+    """Return the derivative of vectors (9, 3, 11) by the plane's turn about x, z or n: axis x b."""
     return lambda x: np.cross(np.eye(3)[axis], x, axisb=1, axisc=1)

@@ -49,10 +49,10 @@ def mass_matrix(boom: Boom, q: ArrayLike, *, drive_inertia: bool = False) -> Arr
 def mass_matrix_and_bias(
     boom: Boom, q: ArrayLike, qd: ArrayLike, *, base: BaseMotion | None = None, tip_force: ArrayLike | None = None
 ) -> tuple[Array, Array]:
-    """Return M(q) (..., 5, 5) and the torque C(q, qd) qd + g(q) (..., 5) at zero joint acceleration.
+    """Return M(q) (..., 5, 5) and the torque C(q, qd) qd + g(q) (..., 5) at qdd = 0.
 
-    They equal `mass_matrix` and `inverse_dynamics` with qdd = 0. On small batches this function takes
-    a fraction of their time.
+    They equal `mass_matrix` and `inverse_dynamics` with qdd = 0. On small batches this function
+    takes a fraction of their time.
 
     Args:
         boom: the boom.

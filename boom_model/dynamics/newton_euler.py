@@ -1,18 +1,25 @@
-"""Newton-Euler over the closed linkage with regrouped inertial parameters: joint torques, pin forces, mount wrench.
+"""Newton-Euler over the closed linkage: joint torques, pin forces and mount wrench.
 
-Every body is followed in the arm's plane, which yaws with theta1: axes x forward, z up and n = x cross z, the plane's normal
-(to the boom's right), origin in frame 1. A link at angle a has its own axes e = (cos a, sin a, 0), p = (-sin a, cos a, 0)
-and n. Any mass element then stands at c = sum_i g_i b_i, with constants g_i and the eleven vectors
+The inertial parameters are regrouped. Every body is followed in the arm's plane, which yaws with
+theta1. Its axes are x forward, z up and the plane's normal n = x cross z (to the boom's right); its
+origin is that of frame 1. A link at angle a has its own axes e = (cos a, sin a, 0),
+p = (-sin a, cos a, 0) and n. Any mass element then stands at c = sum_i g_i b_i, with constants g_i
+and the eleven vectors
 
-    b = o, x, z, n, e2, p2, e3, p3, rho e3, et, pt      (o the origin itself; 2, 3, t: theta2, theta3, theta3 + theta5)
+    b = o, x, z, n, e2, p2, e3, p3, rho e3, et, pt
 
-and its acceleration less gravity is sum_i g_i A_i. With the plane's angular velocity W and the base's acceleration a0,
+Here o is the origin itself, and 2, 3, t stand for theta2, theta3, theta3 + theta5. The acceleration
+of the mass element less gravity is sum_i g_i A_i. With the plane's angular velocity W and the
+base's acceleration a0,
 
-    A_o = a0 - gravity,   A_i = W' x b + W x (W x b) + 2 W x b' + b''      (thesis, eqs. 2.41, 2.42 and 2.44 as corrected).
+    A_o = a0 - gravity,   A_i = W' x b + W x (W x b) + 2 W x b' + b''
 
-Newton's and Euler's equations of a set of bodies ask no more of its masses than the constant Q = int g g^T dm: with
-U = Q A, the force on the set is U_o, and its moment about any pin a sum of b_i x U_i. The equilibrium of tool, extension,
-upper, outer, inner and lower link gives the joint torques and the pin forces from these (eqs. 2.45-2.71).
+These are eqs. 2.41, 2.42 and 2.44 of the thesis, as corrected.
+
+Newton's and Euler's equations of a set of bodies ask no more of its masses than the constant
+Q = int g g^T dm. With U = Q A, the force on the set is U_o, and its moment about any pin a sum of
+b_i x U_i. The equilibrium of tool, extension, upper, outer, inner and lower link gives the joint
+torques and the pin forces from these (eqs. 2.45-2.71).
 
 Where opposite links are unequal, the upper link turns at psi and the outer one at chi (see
 `linkage`). Then psi stands in the place of theta3 above, and four vectors more are needed: el, pl
@@ -55,10 +62,11 @@ _LINKS = ((_E2, _P2), (_E3, _P3), (_ET, _PT), (_EL, _PL), (_EO, _PO))
 
 @dataclass(frozen=True, eq=False)
 class PinForces:
-    """Forces at the linkage's pins [N], each (..., 3) in frame 4: x forward, y to the left, z up, yawing with theta1.
+    """Forces at the linkage's pins [N], each (..., 3) in frame 4.
 
-    They lie in the arm's plane: how pins 7 and 8 share the load across it is statically indeterminate, so y is 0. They grow
-    as 1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right, and as
+    Frame 4 yaws with theta1: x forward, y to the left, z up. The forces lie in the arm's plane: how
+    pins 7 and 8 share the load across it is statically indeterminate, so y is 0. They grow as
+    1/sin(theta3 - theta2) towards the flat parallelogram, where no finite force is right, and as
     1/sin(chi - psi) where links are unequal: see `transmission_angle`.
     """
 
@@ -107,14 +115,16 @@ def inverse_dynamics(
         q: (..., 5) joint positions [rad, m for the extension].
         qd: (..., 5) joint velocities [rad/s, m/s].
         qdd: (..., 5) joint accelerations [rad/s^2, m/s^2].
-        base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level ground.
-        payload_as: "mass" moves the payload with the tip; "force" hangs its weight there and leaves its inertia out, as the
-            thesis does.
+        base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level
+            ground.
+        payload_as: "mass" moves the payload with the tip; "force" hangs its weight there and leaves
+            its inertia out, as the thesis does.
         tip_force: (..., 3) external force on the tip, along frame 1 [N].
         tip_moment: (..., 3) external moment on the tip, along frame 1 [Nm].
         friction: whether tau overcomes the joints' friction, viscous qd + coulomb sign(qd).
-        drive_inertia: whether tau accelerates the drives' reflected inertia N^2 (J_rotor + J_gear) too, where it is known.
-            Friction and drive inertia are added to tau alone; their reaction on the pins and the mount is left out.
+        drive_inertia: whether tau accelerates the drives' reflected inertia N^2 (J_rotor + J_gear)
+            too, where it is known. Friction and drive inertia are added to tau alone; their
+            reaction on the pins and the mount is left out.
         reactions: whether to compute pin forces and mount wrench.
 
     Raises:
@@ -195,9 +205,10 @@ def weight_torque(boom: Boom, q: Array, up: Array | None = None) -> Array:
 
 
 def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
-    """Force (..., 3) [N] that the inner link carries at its upper pin, in frame 5 of the inner loop: x along the link.
+    """Return the force (..., 3) [N] that the inner link carries at its upper pin.
 
-    Chapter 3's f_B: the reaction to the inner link's force on the upper link at frame 8.
+    It is in frame 5 of the inner loop, with x along the link. Chapter 3's f_B: the reaction to the
+    inner link's force on the upper link at frame 8.
 
     Raises:
         InputError: q is not finite or not (..., 5).
@@ -209,7 +220,7 @@ def inner_link_load(q: ArrayLike, pins: PinForces) -> Array:
 
 
 def base_series(base: BaseMotion | None, shape: tuple[int, ...]) -> list[Array]:
-    """Return the entries of a base motion at states of a shape, flattened: (n, 3) each; [] for None.
+    """Return the entries of a base motion at states of a shape, flattened to (n, 3); [] for None.
 
     Raises:
         InputError: an entry does not match the states.
@@ -527,9 +538,10 @@ def _fill_moving(A: Any, plane: _Plane, links: Sequence[_Turn]) -> None:
 def _torques(
     rho: Value, links: Sequence[_Turn], loop: Loop | None, U: Any, moment: _Vector
 ) -> tuple[tuple[Value, ...], Value, Value]:
-    """Return joint torques, the moment of all beyond the actuator about its pin, and that in the plane.
+    """Return joint torques, the moment about the actuator's pin, and the torque in the plane.
 
-    The last is the sum of the torques on all links in the arm's plane. U is along x, z and n.
+    The moment is that of all bodies beyond the actuator. The torque in the plane is the sum of the
+    torques on all links in the arm's plane. U is along x, z and n.
     """
     Ux, Uz, Un = U
     (c2, s2, _, _), (c3, s3, _, _), (ct, st, _, _) = links[:3]

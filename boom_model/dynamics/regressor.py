@@ -1,4 +1,4 @@
-"""Regressor of the closed linkage: the joint torques are linear in the masses, tau = Y(q, qd, qdd) pi.
+"""Regressor of the closed linkage: joint torques are linear in the masses, tau = Y(q, qd, qdd) pi.
 
 A body has ten inertial parameters about the origin of its own frame, along that frame's axes:
 
@@ -8,26 +8,28 @@ They are the entries of its pseudo-inertia P = int (1, r) (1, r)^T dm, a symmetr
 
     P = [[m, m c^T], [m c, (1/2) tr(I) 1 - I]]
 
-P is positive definite exactly if some solid has these parameters (Wensing, Kim and Slotine 2018). Let z_a(q) be the places
-of the body's origin and of a metre along its axes (see `newton_euler`). Virtual work gives for each joint k
+P is positive definite exactly if some solid has these parameters (Wensing, Kim and Slotine 2018).
+Let z_a(q) be the places of the body's origin and of a metre along its axes (see `newton_euler`).
+Virtual work gives for each joint k
 
     tau_k = tr(P G_k),    G_k[a, b] = (dz_a / dq_k) . (d^2 z_b / dt^2 - gravity)
 
-The z obey the closed linkage already. This is therefore G^T Y_tree(G q, G qd, G qdd), where x = G q are the coordinates of
-the tree that a cut of the loop leaves.
+The z obey the closed linkage already. This is therefore G^T Y_tree(G q, G qd, G qdd), where x = G q
+are the coordinates of the tree that a cut of the loop leaves.
 
-On a base at rest 29 combinations of the 70 parameters (the payload's belong to the end effector's) have an effect:
+On a base at rest 29 combinations of the 70 parameters (the payload's belong to the end effector's)
+have an effect:
 
-    9  in-plane inertia and its two differences along the links at theta2, theta3 and theta3 + theta5
+    9  in-plane inertia and its two differences along the links at theta2, theta3, theta3 + theta5
     6  first moments along and across these links, which gravity shows
     1  mass that the extension carries, and 2 first moments that it moves along theta3
     3  products of the links at theta2 with those at theta3, through pins 6 and 8
     1  constant inertia about the yaw axis
     7  products with the normal of the arm's plane
 
-A base that tilts and turns shows 6 more: the yawing body's first moments across its axis, and the rest of its inertia.
-Unequal links show 8 more, weakly, because the lower and the outer link no longer turn with the
-upper and the inner one.
+A base that tilts and turns shows 6 more: the yawing body's first moments across its axis, and the
+rest of its inertia. Unequal links show 8 more, weakly, because the lower and the outer link no
+longer turn with the upper and the inner one.
 """
 
 import numpy as np
@@ -52,15 +54,17 @@ _CHUNK = 512
 def regressor(boom: Boom, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, *, base: BaseMotion | None = None) -> Array:
     """Return Y (..., 5, 80) such that Y pi is `inverse_dynamics(boom, q, qd, qdd, base=base).tau`.
 
-    pi (80,) is `inertial_parameters(boom)`. Y depends on the lengths and the gravity of the boom, not on its masses. The
-    payload is a mass. Friction and the drives' own inertia are left out; their torques are linear in qd, sign(qd) and qdd.
+    pi (80,) is `inertial_parameters(boom)`. Y depends on the lengths and the gravity of the boom,
+    not on its masses. The payload is a mass. Friction and the drives' own inertia are left out;
+    their torques are linear in qd, sign(qd) and qdd.
 
     Args:
         boom: the boom.
         q: (..., 5) joint positions [rad, the extension in m].
         qd: (..., 5) velocities.
         qdd: (..., 5) accelerations. The three broadcast.
-        base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level ground.
+        base: how the vehicle moves the base, each entry (3,) or (..., 3); None is at rest on level
+            ground.
 
     Raises:
         InputError: as `inverse_dynamics`.

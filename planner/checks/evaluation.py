@@ -81,9 +81,10 @@ class Evaluation:
 
     @property
     def basis(self) -> Basis:
-        """Weakest basis of the figures that all torques depend on: those of the bodies and of a vehicle that is not at rest.
+        """Weakest basis of the figures that all torques depend on.
 
-        A body without a basis counts as printed.
+        These are the figures of the bodies and of a vehicle that is not at rest. A body without a
+        basis counts as printed.
         """
         bodies = [Basis.PRINTED if body.origin is None else body.origin.basis for body in self.boom.bodies.values()]
         return Basis.weakest(bodies if self.vehicle is LEVEL else [*bodies, self.vehicle.origin.basis])

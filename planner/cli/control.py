@@ -132,13 +132,15 @@ def control(
 ) -> int:
     """Simulate planned moves in closed loop: controllers, stability margins, tip errors.
 
-    START and GOAL are as in `boom plan`. Exit code 1: a loop is unstable, or a stepper loses a step.
+    START and GOAL are as in `boom plan`. The exit code is 1 if a loop is unstable or a stepper
+    loses a step.
 
     \b
     Examples:
       boom control transport phenotyping --profile all --report followed.pdf
       boom control transport phenotyping --controller pid,stepper --shaper all --out control.rrd
-      boom control transport phenotyping --payload-error 2 --gust 0,0,-30,5.2,0.5 --set structural_damping=0.01
+      boom control transport phenotyping --payload-error 2 --gust 0,0,-30,5.2,0.5
+      boom control transport phenotyping --set structural_damping=0.01
     """
     from planner.control.closed_loop import parse_gust
     from planner.control.design import Goals

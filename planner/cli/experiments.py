@@ -51,11 +51,11 @@ _FEW_POSES = 8
 @all_option
 @json_option
 def calibrate(measured: str | None, suggest: int | None, **given: Any) -> int:
-    """Find the boom's true lengths and zeros from measured tips, or the poses that are worth measuring.
+    """Find the boom's true lengths and zeros from measured tips, or the poses worth measuring.
 
-    MEASURED holds a row a pose: the readings q1..q5 [rad, q4 in m], the tip x, y, z [m] by tracker or total station (empty
-    where not measured), or by tape its distance d from a fixed point ax, ay, az [m]; and where known the standard
-    deviations sx, sy, sz, sd and sq1..sq5.
+    MEASURED holds a row a pose: the readings q1..q5 [rad, q4 in m], the tip x, y, z [m] by tracker
+    or total station (empty where not measured), or by tape its distance d from a fixed point ax,
+    ay, az [m]; and where known the standard deviations sx, sy, sz, sd and sq1..sq5.
 
     \b
     Examples:

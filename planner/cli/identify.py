@@ -1,4 +1,4 @@
-"""Identification of the dynamics: the fit to logs, the payload alone, and the motion worth measuring."""
+"""Identification of the dynamics: fit to logs, payload alone, and the motion worth measuring."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

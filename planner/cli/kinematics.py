@@ -89,7 +89,7 @@ def ik(
 @boom_option
 @json_option
 def fk(joints: str, boom_file: str | None, as_json: bool) -> int:
-    """Show where the tip is at a joint position, in the base frame, and what holding it takes of each joint.
+    """Show the tip at a joint position, in the base frame, and the joint torques that hold it.
 
     \b
     Examples:

@@ -93,7 +93,8 @@ def plan(
       boom plan transport phenotyping
       boom plan transport tip=1.4,0,1.0 --constraint extension=0.25 --profile time-optimal
       boom plan tip=1,1.7,0.9 tip=-1,1.7,0.9 --along line --profile jerk-limited
-      boom plan transport phenotyping --via q=40,60,120,0.3,0 --pass-via --profile time-optimal --jerk-bound --rate 250
+      boom plan transport phenotyping --via q=40,60,120,0.3,0 --pass-via --profile time-optimal
+      boom plan transport phenotyping --profile time-optimal --jerk-bound --rate 250
     """
     check_picture(picture)
     if then_view:

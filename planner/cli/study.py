@@ -45,7 +45,7 @@ def study(
     whole: bool,
     as_json: bool,
 ) -> int:
-    """Vary a boom, its drives and its mission, and tell what comes of it: how often it FAILs, and what decides.
+    """Vary a boom, its drives and its mission; show how often it FAILs, and what decides.
 
     STUDY is a FILE.toml, or one of lighter-boom, lighter-motor, payload-reach and tolerance.
 
@@ -122,7 +122,7 @@ def _print(results: "Results", written: dict[str, str], whole: bool, as_json: bo
 
 
 def _details(results: "Results") -> list[tuple[tuple[str, ...], list[Any], int]]:
-    """Return the tables of the answer, each with the number of rows that are shown without --all."""
+    """Return the tables of the answer, each with the number of rows shown without --all."""
     from planner.studies import report
     from planner.studies.analysis import FAILS
 
@@ -137,7 +137,7 @@ def _details(results: "Results") -> list[tuple[tuple[str, ...], list[Any], int]]
 
 
 def _whole_factors(levels: "Sequence[tuple[str, ...]]", most: int) -> int:
-    """Return how many rows of levels to show, at most so many, without parting those of a factor."""
+    """Return how many rows of levels to show, at most so many, keeping a factor's rows together."""
     if len(levels) <= most:
         return len(levels)
     return max(k for k in range(most + 1) if k == 0 or levels[k - 1][0] != levels[k][0])

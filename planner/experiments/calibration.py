@@ -6,8 +6,8 @@ Each pose contributes its residual, measured less predicted, divided by its stan
    off than chance allows is left out, by name.
 2. The derivative's columns are scaled by `TOLERANCE`, the error expected of each parameter. A
    singular value s means that the data determine its direction to 1/s tolerances. While the least
-   one is below 1, the data tell less than is known beforehand: a parameter of that direction is held
-   at the value of the boom's file, and named with those that it cannot be told from.
+   one is below 1, the data tell less than is known beforehand: a parameter of that direction is
+   held at the value of the boom's file, and named with those that it cannot be told from.
 3. Least squares on the remaining poses and parameters give values and the covariance (J^T J)^-1,
    times the residuals' variance where that exceeds the stated one, or where none is stated.
 4. The residual of a pose that had been left out of the fit is (I - H)^-1 r, with the pose's block H
@@ -125,7 +125,9 @@ class Calibrated:
         return rms(self.held_out[self.used])
 
     def predicted(self, readings: ArrayLike) -> tuple[Array, Array]:
-        """Return tip positions (n, 3) in the measuring frame and their covariance (n, 3, 3) at readings (n, 5).
+        """Return tip positions (n, 3) and their covariance (n, 3, 3) at readings (n, 5).
+
+        Both are in the measuring frame.
 
         Raises:
             InputError: readings are not finite or not (n, 5).
@@ -169,7 +171,7 @@ class Check:
 
 
 def rms(errors: Array) -> float:
-    """Return the root of the mean squared distance [m] over poses (n, 3); what was not measured counts as 0."""
+    """Return the RMS distance [m] over poses (n, 3); what was not measured counts as 0."""
     return float(np.sqrt(np.nanmean(np.nansum(np.square(errors), axis=-1)))) if len(errors) else float("nan")
 
 
@@ -295,7 +297,7 @@ def _fitted(
 
 
 def _placed(measured: Measurements, model: TipModel, yields: Array) -> TipModel:
-    """Return the model in its best place: by the tips themselves, or by distances from where it stands."""
+    """Return the model in its best place: by the tips, or by distances from where it stands."""
     tips = model.tip(measured.readings, yields)
     if not measured.by_distance.any() or np.isfinite(measured.tip).all(axis=-1).sum() >= _PLACED:
         return replace(model, frame=aligned(tips, measured.tip))
@@ -304,7 +306,7 @@ def _placed(measured: Measurements, model: TipModel, yields: Array) -> TipModel:
 
 
 class _Whitened:
-    """Residuals in standard deviations: those of the tip, and of the readings through the derivative."""
+    """Residuals in standard deviations, of the tip and, through the derivative, of the readings."""
 
     def __init__(self, measured: Measurements, model: TipModel, yields: Array, sd: float) -> None:
         self.measured, self.yields, self.sd = measured, yields, sd
@@ -354,7 +356,7 @@ def _solve(
 
 
 def _good(whiten: _Whitened, model: TipModel, count: int) -> Mask:
-    """Return the poses whose residual is not farther off than chance allows, whatever the true noise is."""
+    """Return the poses whose residual is no more than chance allows, whatever the true noise is."""
     square = np.square(whiten.residuals(model)).sum(axis=-1)
     known = whiten.finite.sum(axis=-1)
     total = int(known.sum())
@@ -398,7 +400,10 @@ def _told(
 
 
 def _alike(J: Array, names: tuple[str, ...], held: str, free: list[str]) -> tuple[str, ...]:
-    """Return the parameters that move the tips as a held one does; none if that moves them by less than the noise."""
+    """Return the parameters that move the tips as a held one does.
+
+    There are none if it moves the tips by less than the noise.
+    """
     own, others = J[:, names.index(held)], J[:, [names.index(name) for name in free]]
     if np.linalg.norm(own) < 1.0:
         return ()

@@ -1,4 +1,4 @@
-"""The boom's file with what a calibration has measured; the rest of it, comments included, stays."""
+"""The boom's file with what a calibration has measured; the rest, comments included, stays."""
 
 import re
 from pathlib import Path

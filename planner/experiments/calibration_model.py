@@ -1,4 +1,4 @@
-"""Tip position as a function of the parameters that a calibration can find, with the exact derivative.
+"""Tip position as a function of a calibration's parameters, with the exact derivative.
 
     x = R p(q) + t,    q_i = scale_i reading_i + offset_i - c_i w_i(tau_i)
 
@@ -111,7 +111,7 @@ class TipModel:
         return replace(self, boom=replace(self.boom, geometry=geometry), target=read_only(target), frame=frame, **parts)
 
     def joints(self, readings: Array, yields: Array) -> Array:
-        """Return the joint positions (n, 5) at readings, with the printed wind-ups `yields` (n, 5)."""
+        """Return joint positions (n, 5) at readings, with the printed wind-ups `yields` (n, 5)."""
         return np.asarray(self.scale * readings + self.offset - self.wind_up * yields)
 
     def tip(self, readings: Array, yields: Array) -> Array:
@@ -172,7 +172,7 @@ def candidates(boom: Boom, *, known_frame: bool, equal_links: bool) -> tuple[str
 
 
 def aligned(at: Array, measured: Array) -> Frame:
-    """Return the frame that brings points (n, 3) nearest to measured ones, by least squares (Kabsch 1976).
+    """Return the frame that fits points (n, 3) to measured ones by least squares (Kabsch 1976).
 
     Raises:
         InputError: the points are fewer than 3, or on one line.
@@ -195,7 +195,9 @@ def aligned(at: Array, measured: Array) -> Frame:
 
 
 def require_a_shape(model: TipModel, readings: Array) -> None:
-    """Refuse readings at which the linkage is flat, because its inequality then moves the tip without bound.
+    """Refuse readings at which the linkage is flat.
+
+    Its inequality then moves the tip without bound.
 
     Raises:
         InputError: names the pose and what to measure instead.

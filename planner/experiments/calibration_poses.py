@@ -50,7 +50,7 @@ def suggest_poses(
     measured: Array | None = None,
     seed: int = 0,
 ) -> SuggestedPoses:
-    """Choose poses within the joint limits and the drives' static torque, clear of the keep-out shapes.
+    """Choose poses within the joint limits and the drives' static torque, clear of keep-out shapes.
 
     The linkage keeps its transmission angle above the boom's warning.
 

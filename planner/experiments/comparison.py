@@ -184,7 +184,7 @@ def smoothed(log: Log, window: float = WINDOW) -> Smoothed:
 
 
 def evenly_sampled(log: Log, window: float) -> Log:
-    """Return a log whose steps differ by less than 1 %, resampled by linear interpolation if they do not.
+    """Return a log whose steps differ by less than 1 %, resampled by linear interpolation if not.
 
     Raises:
         InputError: a gap is longer than `window` [s].
@@ -206,7 +206,7 @@ def evenly_sampled(log: Log, window: float) -> Log:
 
 
 def _calibrated(boom: Boom, log: Log) -> Log:
-    """Return the log with joint positions in the place of readings, where the boom is calibrated."""
+    """Return the log with joint positions in place of readings, where the boom is calibrated."""
     known = boom.calibration
     if known is None:
         return log

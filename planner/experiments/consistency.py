@@ -1,10 +1,10 @@
-"""Physically consistent fit: a quadratic cost under a linear matrix inequality for each body, by Clarabel.
+"""Physically consistent fit by Clarabel: quadratic cost, one linear matrix inequality per body.
 
     minimise (1/2) x . H x - b . x   such that   R^(-1/2) P(x) R^(-1/2) >= e 1 for each body,
     viscous >= 0, coulomb >= |asymmetric|, drive inertia >= 0
 
-P and R are those of `unknowns`. A body whose pseudo-inertia is positive definite has a positive mass, and some distribution
-of mass has its parameters (Wensing, Kim and Slotine 2018).
+P and R are those of `unknowns`. A body whose pseudo-inertia is positive definite has a positive
+mass, and some distribution of mass has its parameters (Wensing, Kim and Slotine 2018).
 """
 
 import numpy as np

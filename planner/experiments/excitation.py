@@ -1,13 +1,14 @@
-"""Motions that tell the most about the dynamics: periodic, from rest to rest, within every limit of the boom.
+"""Motions that tell the most about the dynamics: periodic, rest to rest, within the boom's limits.
 
 Each joint follows a Fourier series of H harmonics (Swevers and others 1997):
 
     q(t) = q0 + sum over k of a_k sin(k w t) + b_k (cos(k w t) - 1),    sum k a_k = sum k^2 b_k = 0
 
-The two sums make velocity and acceleration 0 at the start and the end of each period, so the motion can be planned to, and
-repeated. Let Y be the regressor of the base parameters along the motion, each column divided by its RMS over the whole
-workspace. The design either minimises the condition number of Y, which says how evenly the motion tells the parameters, or
-maximises log det Y^T Y, which says how much it tells.
+The two sums make velocity and acceleration 0 at the start and the end of each period, so the motion
+can be planned to, and repeated. Let Y be the regressor of the base parameters along the motion,
+each column divided by its RMS over the whole workspace. The design either minimises the condition
+number of Y, which says how evenly the motion tells the parameters, or maximises log det Y^T Y,
+which says how much it tells.
 """
 
 from dataclasses import dataclass, replace
@@ -81,13 +82,19 @@ class Excitation:
 
 
 def condition_number(boom: Boom, motion: tuple[Array, Array, Array]) -> float:
-    """Return the condition number of the regressor Y along states q, qd, qdd (n, 5), infinite if it lacks a combination."""
+    """Return the condition number of the regressor Y along states q, qd, qdd (n, 5).
+
+    It is infinite if Y lacks a combination.
+    """
     values = np.linalg.eigvalsh(_information(boom, *motion))
     return float(np.sqrt(values[-1] / values[0])) if values[0] > 1e-14 * values[-1] else float("inf")
 
 
 def log_information(boom: Boom, motion: tuple[Array, Array, Array]) -> float:
-    """Return log det of the mean Y^T Y along states q, qd, qdd (n, 5), for torques of 1 Nm and 1 N of noise."""
+    """Return log det of the mean Y^T Y along states q, qd, qdd (n, 5).
+
+    The noise of the torques is 1 Nm and 1 N.
+    """
     return float(np.linalg.slogdet(_information(boom, *motion))[1])
 
 
@@ -101,7 +108,7 @@ def design(
     rounds: int = ROUNDS,
     track: Track = iter,
 ) -> Excitation:
-    """Return the best motion found from the best of some random ones, by BFGS with a penalty for the limits.
+    """Return the best motion, by BFGS from the best of some random ones, with a penalty for limits.
 
     The limits are those of positions, lower - inner, velocities, accelerations and drive torques.
 
@@ -165,7 +172,7 @@ def random_excitation(
 
 
 def _within_limits(motion: Excitation) -> Excitation | None:
-    """Return the motion, its amplitude reduced until it keeps the limits; None if it would have to stand still."""
+    """Return the motion, its amplitude reduced to keep the limits; None if it must stand still."""
     t = np.linspace(0.0, motion.period, _FINE + 1)
     offset = motion(t)[0].mean(axis=0) - motion.centre
 
@@ -191,7 +198,10 @@ def _worse(criterion: Criterion, a: Excitation, b: Excitation) -> bool:
 
 
 def _basis(harmonics: int) -> tuple[Array, Array]:
-    """Orthonormal columns of the a with sum k a_k = 0, and of the b with sum k^2 b_k = 0: (H, H - 1) each."""
+    """Return columns (H, H - 1) of the a with sum k a_k = 0 and of the b with sum k^2 b_k = 0.
+
+    They are orthonormal before row k is divided by k.
+    """
     from scipy.linalg import null_space
 
     k = np.arange(1.0, harmonics + 1.0)

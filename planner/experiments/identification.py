@@ -1,14 +1,15 @@
 """Identification of the boom's dynamics from measured motions and torques.
 
-The torques are linear in the unknown parameters (`unknowns`). The fit is weighted least squares. Each joint's weight is the
-inverse variance of its residual, found by iteration. Residuals of neighbouring samples may be alike; the variance is
-therefore multiplied by the residual's integrated autocorrelation time, 1 for white noise. The noise of the accelerations is
-in the regressor, and makes inertias come out too small. What it adds to the normal equations on average is subtracted.
+The torques are linear in the unknown parameters (`unknowns`). The fit is weighted least squares.
+Each joint's weight is the inverse variance of its residual, found by iteration. Residuals of
+neighbouring samples may be alike; the variance is therefore multiplied by the residual's integrated
+autocorrelation time, 1 for white noise. The noise of the accelerations is in the regressor, and
+makes inertias come out too small. What it adds to the normal equations on average is subtracted.
 
-Two answers come of it. The *base parameters* are the combinations that torques can tell at all: independent columns of the
-regressor over the whole workspace, by QR with column pivoting (Gautier 1990). They are fitted to the log alone. The
-*consistent fit* gives each body figures that a solid can have (`consistency`), and stays near those of the boom's file where
-the log tells nothing.
+Two answers come of it. The *base parameters* are the combinations that torques can tell at all:
+independent columns of the regressor over the whole workspace, by QR with column pivoting (Gautier
+1990). They are fitted to the log alone. The *consistent fit* gives each body figures that a solid
+can have (`consistency`), and stays near those of the boom's file where the log tells nothing.
 """
 
 from collections.abc import Sequence
@@ -141,7 +142,10 @@ class Identification:
         return boom if self.drive_inertia is None else boom.with_drive_inertia(self._rotors(self.drive_inertia))
 
     def _rotors(self, inertia: Array) -> list[Sourced[float]]:
-        """Drive inertias with what the torques tell of them: of some joints only their sum with the link's inertia."""
+        """Drive inertias with what the torques tell of them.
+
+        Of some joints, that is only the sum with the link's inertia.
+        """
         found = []
         for i, joint in enumerate(JOINTS):
             shared = joint not in TOLD_APART
@@ -196,7 +200,8 @@ def identify(boom: Boom, logs: Sequence[Readings], *, drive_inertia: bool = Fals
         boom: the boom with the payload that it carried; its figures are the starting point.
         logs: measured motions, as the joints read; the boom's calibration is applied. The last
             HELD_OUT of each is kept for validation.
-        drive_inertia: whether the torques accelerate the drives' own inertia too, as those computed from motor currents do.
+        drive_inertia: whether the torques accelerate the drives' own inertia too, as those computed
+            from motor currents do.
 
     Raises:
         InputError: positions are in another unit, or torques have the wrong sign, unit or side of
@@ -270,9 +275,10 @@ def _blocks(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Array]:
 
 
 def _noise_of_rows(unknowns: Unknowns, log: Readings, counts: Array) -> Array:
-    """(5, 90, 90) the expected sum of c dY^T dY of each joint, dY the error of its rows by noise in the accelerations.
+    """Return the expected sum (5, 90, 90) of c dY^T dY of each joint.
 
-    Rows are linear in qdd: dY = sum over joints k of dqdd_k dY/dqdd_k.
+    dY is the error of its rows by noise in the accelerations. Rows are linear in qdd: dY = sum over
+    joints k of dqdd_k dY/dqdd_k.
     """
     variance = log.acceleration_variance(BLOCK)
     some = slice(max(1, round(BLOCK / log.step)) // 2, None, max(1, round(BLOCK / log.step)))
@@ -296,7 +302,10 @@ def _normal_equations(data: _Data, variance: Array) -> tuple[Array, Array]:
 
 
 def _variance(data: _Data, x: Array, H: Array, weights: Array) -> Array:
-    """Variance (5,) of a sample, less what the fit took up, times the autocorrelation time of the residual."""
+    """Return the variance (5,) of a sample, less what the fit took up.
+
+    It is multiplied by the autocorrelation time of the residual.
+    """
     left, C = data.residual(x), np.linalg.inv(H + np.eye(90))
     found = np.empty(5)
     for j in range(5):
@@ -308,7 +317,7 @@ def _variance(data: _Data, x: Array, H: Array, weights: Array) -> Array:
 
 
 def autocorrelation_time(r: Array) -> float:
-    """Return 1 + 2 sum of the autocorrelations of r (n,), up to the first that is within its own noise."""
+    """Return 1 + 2 sum of the autocorrelations of r (n,), up to the first within its own noise."""
     energy, total = float(r @ r), 1.0
     if energy == 0.0:
         return total
@@ -321,9 +330,9 @@ def autocorrelation_time(r: Array) -> float:
 
 
 def base_columns(boom: Boom) -> tuple[Array, Array]:
-    """Return the columns (m,) of the regressor that base parameters lead, and their RMS (m,) over the whole workspace.
+    """Return the columns (m,) of the regressor that base parameters lead, and their RMS (m,).
 
-    The torques are those behind the gearboxes.
+    The RMS is over the whole workspace. The torques are those behind the gearboxes.
     """
     _, chosen, sizes = _structure(boom, False)
     return np.array(chosen), sizes

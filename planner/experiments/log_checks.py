@@ -37,7 +37,8 @@ def require_plausible_torques(boom: Boom, logs: Sequence[Readings], *, payload_k
     another sign or unit is.
 
     Raises:
-        InputError: a gain is negative or a power of ten or a gear ratio away from 1. The message says what it looks like.
+        InputError: a gain is negative or a power of ten or a gear ratio away from 1. The message
+            says what it looks like.
     """
     for i in range(len(JOINTS)):
         fit = _fitted(boom, logs, i)
@@ -183,7 +184,10 @@ def residual_notes(after: Array, noise: Array) -> tuple[str, ...]:
 
 
 def delay_notes(delay: float, deviation: float) -> tuple[str, ...]:
-    """Say that torques and positions seem to be stamped at different times, by a delay [s] and its standard deviation."""
+    """Say that torques and positions seem to be stamped at different times.
+
+    `delay` [s] is judged by its standard deviation `deviation` [s].
+    """
     if abs(delay) < max(_NOTICED, _SURE * deviation):
         return ()
     way = "late" if delay > 0.0 else "early"

@@ -23,7 +23,9 @@ _INERTIA = "inertia_kg_m2"
 
 
 def write_identified(path: str | Path, source: str | Path | None, found: Identification, logs: str) -> None:
-    """Write a boom's TOML file with the identified bodies, friction and drive inertia, basis measured; comments stay.
+    """Write a boom's TOML file with the identified bodies, friction and drive inertia.
+
+    Their basis is `measured`. Comments stay.
 
     Args:
         path: the file to write.
@@ -120,5 +122,8 @@ def _rotor_table(inertia: Sourced[float], logs: str) -> "InlineTable":
 
 
 def _digits(value: float) -> float:
-    """Return the number with ten significant digits: less would make a thin body's inertia one that no solid has."""
+    """Return the number with ten significant digits.
+
+    With fewer, a thin body's inertia may become one that no solid has.
+    """
     return float(f"{value:.10g}")

@@ -1,4 +1,4 @@
-"""Slips that measured tips give away: the sign of a joint, swapped joints, shifted rows, a mirrored frame, a unit."""
+"""Slips in measured tips: sign of a joint, swapped joints, shifted rows, mirrored frame, unit."""
 
 from collections.abc import Iterator
 
@@ -20,7 +20,8 @@ _UNITS = {"centimetres": 100.0, "inches": 39.3701, "feet": 3.28084, "kilometres"
 def require_plausible_tips(measured: Measurements, model: TipModel, known_frame: bool) -> None:
     """Refuse tips that no calibration of lengths and zeros brings to the boom of the file.
 
-    The boom is put in its best place among the tips. If the median distance is then beyond 0.3 m, likely slips are tried.
+    The boom is put in its best place among the tips. If the median distance is then beyond 0.3 m,
+    likely slips are tried.
 
     Raises:
         InputError: the tips are that far off; the message says which slip explains it, if one does.

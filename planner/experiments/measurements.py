@@ -1,4 +1,4 @@
-"""Measured tip positions, or distances of the tip from fixed points, with the joint readings of their poses."""
+"""Measured tip positions, or distances of the tip from fixed points, with the joint readings."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +44,7 @@ class Measurements:
     """(n, 5) standard deviation of the readings [rad, m]"""
     name: str = "measurements"
     anchor: Array | None = None
-    """(n, 3) fixed point from which the distance was measured [m], NaN for a pose with coordinates; None without any."""
+    """(n, 3) fixed point of each distance [m], NaN for poses with coordinates; None without any."""
 
     @property
     def by_distance(self) -> Mask:
@@ -52,7 +52,10 @@ class Measurements:
         return np.zeros(len(self.tip), dtype=bool) if self.anchor is None else np.isfinite(self.anchor[:, 0])
 
     def seen(self, tip: Array) -> Array:
-        """Return what is measured of tips (n, 3) in the measuring frame: the coordinates, or the distance and zeros."""
+        """Return what is measured of tips (n, 3): the coordinates, or the distance and zeros.
+
+        The tips are in the measuring frame.
+        """
         if self.anchor is None:
             return tip
         by, found = self.by_distance, tip.copy()
@@ -149,16 +152,17 @@ def _require_si(name: str, q: Array, tip: Array) -> None:
 
 
 def read_measurements(path: str | Path, tip_sd: float | None = None) -> Measurements:
-    """Read q1..q5 and x, y, z, or d and ax, ay, az, with any of sx, sy, sz, sd and sq1..sq5, all in SI.
+    """Read q1..q5 and x, y, z, or d and ax, ay, az, with any of sx, sy, sz, sd, sq1..sq5, in SI.
 
-    An empty coordinate was not measured. d is the distance of the tip from the fixed point ax, ay, az.
+    An empty coordinate was not measured. d is the tip's distance from the fixed point ax, ay, az.
 
     Args:
         path: the CSV file.
         tip_sd: standard deviation of a coordinate or distance [m] where the file has none.
 
     Raises:
-        InputError: the file cannot be read, a column is missing or does not hold numbers, or as `Measurements.of`.
+        InputError: the file cannot be read, a column is missing or does not hold numbers, or as
+            `Measurements.of`.
     """
     table = _table(path)
     names = frozenset(table.column_names)

@@ -1,10 +1,11 @@
-"""Mass and centre of mass of the payload from one short move, with a boom whose other figures are known.
+"""Mass and centre of mass of the payload from one short move, with a boom otherwise known.
 
     tau - tau(boom without payload) = Y_m m + Y_h (m c) + Y_I (I_c + m (c.c 1 - c c^T))
 
-is linear in m and m c but for the payload's inertia about the tip, which follows from them: it is put in by iteration, with
-the inertia about the centre of mass in proportion to the mass. What a move cannot tell of c (along the wrist's axis without
-yaw, say) is held at the file's figure, with a standard deviation of 0.1 m. Weights and intervals are those of `identification`.
+is linear in m and m c but for the payload's inertia about the tip, which follows from them: it is
+put in by iteration, with the inertia about the centre of mass in proportion to the mass. What a
+move cannot tell of c (along the wrist's axis without yaw, say) is held at the file's figure, with a
+standard deviation of 0.1 m. Weights and intervals are those of `identification`.
 """
 
 from collections.abc import Sequence
@@ -119,7 +120,7 @@ def identify_payload(boom: Boom, logs: Sequence[Readings], *, drive_inertia: boo
 
 
 def _rows(unknowns: Unknowns, log: Readings) -> tuple[Array, Array, Mask]:
-    """Columns of the payload (n, 5, 10), the torque (n, 5) that it must explain, and where the joints move."""
+    """Return columns of the payload (n, 5, 10), the torque (n, 5) to explain, and moving joints."""
     states = (log.q, log.qd, log.qdd)
     columns = unknowns.payload_rows(*states)
     return columns, log.tau - unknowns.rows(*states) @ unknowns.start, log.moving

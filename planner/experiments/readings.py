@@ -1,11 +1,13 @@
-"""Logs made ready for identification: evenly sampled, low-pass filtered without delay, and differentiated.
+"""Logs for identification: evenly sampled, low-pass filtered without delay, and differentiated.
 
-Positions pass a Butterworth filter of fourth order forwards and backwards, so that nothing is delayed. Central differences of
-the filtered positions give velocities and accelerations. Torques are not filtered: their noise averages out in the fit.
+Positions pass a Butterworth filter of fourth order forwards and backwards, so that nothing is
+delayed. Central differences of the filtered positions give velocities and accelerations. Torques
+are not filtered: their noise averages out in the fit.
 
-A narrow filter distorts the motion. A wide one passes noise, and noise in the accelerations makes the fit underestimate
-inertias by the ratio of the variances. The filter is therefore as narrow as the log allows: it removes noise alone. What
-noise it passes is known, and the fit takes it into account.
+A narrow filter distorts the motion. A wide one passes noise, and noise in the accelerations makes
+the fit underestimate inertias by the ratio of the variances. The filter is therefore as narrow as
+the log allows: it removes noise alone. What noise it passes is known, and the fit takes it into
+account.
 """
 
 from dataclasses import dataclass, replace
@@ -101,12 +103,14 @@ class Readings:
 
 
 def read_torque_log(path: str | Path, torque_per_ampere: ArrayLike | None = None) -> Log:
-    """Read a log with torques or motor currents from CSV or Parquet: t, q1..q5, tau1..tau5, any of qd1..qd5 and qdd1..qdd5.
+    """Read a log with torques or motor currents from CSV or Parquet.
+
+    The columns are t, q1..q5, tau1..tau5 and any of qd1..qd5 and qdd1..qdd5.
 
     Args:
         path: the file.
-        torque_per_ampere: (5,) motor constant times gear ratio [Nm/A, the extension's N/A]; tau1..tau5 are then currents [A].
-            None takes them as torques at the joints.
+        torque_per_ampere: (5,) motor constant times gear ratio [Nm/A, the extension's N/A];
+            tau1..tau5 are then currents [A]. None takes them as torques at the joints.
 
     Raises:
         InputError: as `read_log`, or there are no torques.
@@ -123,7 +127,7 @@ def readings_of(log: Log, cutoff: float | None = None, *, every_joint: bool = Tr
     """Return a log's states and torques, with filtered positions and their derivatives.
 
     Args:
-        log: positions and torques. Velocities and accelerations are used as given if both are there.
+        log: positions and torques. Velocities and accelerations are used as given if both exist.
         cutoff: of the filter [Hz]. None selects the narrowest that removes noise alone.
         every_joint: whether every joint must move, as a fit needs it.
 
@@ -177,7 +181,7 @@ def readings_of(log: Log, cutoff: float | None = None, *, every_joint: bool = Tr
 
 
 def _moving(qd: Array, noise: Array, step: float, cutoff: float) -> Mask:
-    """(n, 5) where a joint moves, but for the time over which the filter smears a change of direction."""
+    """Return where a joint moves (n, 5), except where the filter smears a change of direction."""
     from scipy.ndimage import binary_erosion
 
     speed_noise = noise * 2.0 * np.pi * cutoff * np.sqrt(2.0 * cutoff * step / 3.0)
@@ -188,9 +192,10 @@ def _moving(qd: Array, noise: Array, step: float, cutoff: float) -> Mask:
 
 
 def _noise(values: Array) -> Array:
-    """Return the standard deviation (5,) of noise that is independent from sample to sample, by third differences.
+    """Return the standard deviation (5,) of noise that is independent from sample to sample.
 
-    The median of the absolute values is used: a step in the torque does not count as noise.
+    It is found by third differences. The median of the absolute values is used: a step in the
+    torque does not count as noise.
     """
     differences: Array = np.median(np.abs(np.diff(values, 3, axis=0)), axis=0) / 0.6745 / np.sqrt(20.0)
     return differences

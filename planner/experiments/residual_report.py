@@ -45,7 +45,7 @@ def details(answer: dict[str, Any], measured: tuple[str, ...]) -> str:
 
 
 def residual_figure(found: Residuals) -> "Figure":
-    """Draw the torque that each model leaves over time, a panel a joint, and the distance of the tips."""
+    """Draw the torque that each model leaves over time, a panel a joint, and the tips' distance."""
     figure, panels = _panels()
     for i, axes in enumerate(panels[:5]):
         for fit, color, name in ((found.before, _BEFORE, "before"), (found.after, _AFTER, "after")):

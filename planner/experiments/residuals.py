@@ -1,12 +1,13 @@
 """Torques of a log that two models leave unexplained, and what the second model explains better.
 
-With the log's torque tau and the parts p of a model's torque, r = tau - sum p is the residual. The two models' parts
-differ by d_p = p_after - p_before, so r_before - r_after = sum d_p, and exactly
+With the log's torque tau and the parts p of a model's torque, r = tau - sum p is the residual. The
+two models' parts differ by d_p = p_after - p_before, so r_before - r_after = sum d_p, and exactly
 
     |r_before|^2 - |r_after|^2 = sum over parts <r_before + r_after, d_p>
 
-Each term over |r_before|^2 is the share of the residual that a part takes away. It is negative where the part makes it
-worse. Only samples count in which the joint moves, because dry friction has no known direction in the others.
+Each term over |r_before|^2 is the share of the residual that a part takes away. It is negative
+where the part makes it worse. Only samples count in which the joint moves, because dry friction has
+no known direction in the others.
 """
 
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from planner.experiments.comparison import Log
 from planner.experiments.readings import Readings, readings_of
 
 PARTS = ("gravity", "inertia", "velocity", "payload", "friction", "drive inertia")
-"""Parts of a torque, as `breakdown` has them; the last is that of the drives, where the torques accelerate it."""
+"""Parts of a torque, as in `breakdown`. The last is the drives', if the torques accelerate them."""
 
 HEADER = ("joint", "before", "after", "noise", "factor", "taken away by")
 """Columns of `cells`: RMS of the torque that a model leaves."""
@@ -52,7 +53,7 @@ class Fit:
     tip: Array
     """(n, 3) in frame 1 [m]"""
     tip_sd: Array | None
-    """(n,) standard deviation of the tip, see `tip_deviation` [m]; None where the boom is not calibrated."""
+    """(n,) standard deviation of the tip, see `tip_deviation` [m]; None without a calibration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +81,10 @@ class Residuals:
 
     @cached_property
     def shares(self) -> dict[str, Array]:
-        """(5,) of each part; the shares and what is left, the squared ratio of the residuals, add up to 1."""
+        """(5,) of each part.
+
+        These and what is left, the squared ratio of the residuals, add up to 1.
+        """
         both = (self.before.residual + self.after.residual) * self.used
         whole = np.maximum((self.before.residual**2 * self.used).sum(axis=0), np.finfo(float).tiny)
         return {
@@ -155,13 +159,15 @@ def residuals(
 ) -> Residuals:
     """Return what two models leave of the torques of a log.
 
-    Positions are filtered without delay, as `identify` does. Each model applies its own calibration to the readings.
+    Positions are filtered without delay, as `identify` does. Each model applies its own calibration
+    to the readings.
 
     Args:
         before: the boom as it was designed.
         after: the boom as measured, with the same payload.
         log: readings of the joints and torques.
-        drive_inertia: whether the torques accelerate the drives' own inertia, as those computed from motor currents do.
+        drive_inertia: whether the torques accelerate the drives' own inertia, as those computed
+            from motor currents do.
         payload_as: see `inverse_dynamics`.
         cutoff: of the filter [Hz]; None selects the narrowest that removes noise alone.
 

@@ -1,14 +1,15 @@
-"""Unknowns of an identification: inertial parameters of the bodies, drive inertia and friction, in comparable units.
+"""Unknowns of an identification: inertial parameters, drive inertia, friction, in comparable units.
 
     tau = Y(q, qd, qdd) pi + J qdd + viscous qd + coulomb sign(qd) + asymmetric
 
-The figures of the boom's file are the starting point x = 0. For a body with pseudo-inertia P0, mass m and R = P0 + m r^2 on
-the diagonal of its second moments,
+The figures of the boom's file are the starting point x = 0. For a body with pseudo-inertia P0, mass
+m and R = P0 + m r^2 on the diagonal of its second moments,
 
-    P(x) = P0 + s R^(1/2) D(x) R^(1/2),    D symmetric with entries x (those off the diagonal divided by sqrt(2))
+    P(x) = P0 + s R^(1/2) D(x) R^(1/2)
 
-so that x of length 1 means a change of s = 30 % in mass, or of some 15 mm in a thin body's centre of mass (r = 50 mm). This
-is the distance to which Lee and Park's metric (2018) tends for small changes.
+D is symmetric with entries x (those off the diagonal divided by sqrt(2)), so that x of length 1
+means a change of s = 30 % in mass, or of some 15 mm in a thin body's centre of mass (r = 50 mm).
+This is the distance to which Lee and Park's metric (2018) tends for small changes.
 """
 
 from dataclasses import dataclass
@@ -44,7 +45,7 @@ _UPPER = np.triu_indices(4)
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """Unknown parameters p = p0 + T x; p holds 70 inertial parameters, 5 drive inertias and 3 x 5 of friction."""
+    """Unknowns p = p0 + T x: 70 inertial parameters, 5 drive inertias and 3 x 5 of friction."""
 
     boom: Boom
     drive_inertia: bool
@@ -100,7 +101,10 @@ class Unknowns:
         return T
 
     def rows(self, q: Array, qd: Array, qdd: Array, direction: Array | None = None) -> Array:
-        """Return the derivative of tau by p at states (n, 5), as (n, 5, 90); `direction` replaces sign(qd)."""
+        """Return the derivative (n, 5, 90) of tau by p at states (n, 5).
+
+        `direction` replaces sign(qd).
+        """
         rows = np.zeros((len(q), 5, 90))
         rows[..., :70] = regressor(self.boom, q, qd, qdd)[..., :70]
         joint = np.arange(5)
@@ -120,7 +124,7 @@ class Unknowns:
         return tau + p[70:75] * readings.qdd + viscous * readings.qd + coulomb * direction + asymmetric
 
     def payload_rows(self, q: Array, qd: Array, qdd: Array) -> Array:
-        """Return the derivative of tau by the payload's ten parameters at states (n, 5), as (n, 5, 10)."""
+        """Return the derivative (n, 5, 10) of tau by the payload's parameters at states (n, 5)."""
         return regressor(self.boom, q, qd, qdd)[..., 70:]
 
     @cached_property
@@ -130,7 +134,10 @@ class Unknowns:
 
 
 def symmetric(x: Array) -> Array:
-    """Return the symmetric matrices (..., 4, 4) with entries x (..., 10), those off the diagonal divided by sqrt(2)."""
+    """Return the symmetric matrices (..., 4, 4) with entries x (..., 10).
+
+    Those off the diagonal are divided by sqrt(2).
+    """
     x = np.asarray(x, dtype=float)
     D = np.zeros((*x.shape[:-1], 4, 4))
     D[..., _UPPER[0], _UPPER[1]] = x / np.where(_UPPER[0] == _UPPER[1], 1.0, np.sqrt(2.0))

@@ -92,7 +92,7 @@ def log_arrows(recording: rr.RecordingStream, boom: Boom, t: Array, q: Array, lo
 
 
 def arrows(boom: Boom, q: Array, loads: Loads, scale: Scale, part: slice = slice(None)) -> Iterator[tuple[str, Array, Array]]:
-    """Yield the name, the foot (n, 3) [m] and the vector (n, 3) [m] of each arrow in the frame "mount".
+    """Yield name, foot (n, 3) [m] and vector (n, 3) [m] of each arrow in the frame "mount".
 
     Args:
         boom: the boom.

@@ -37,13 +37,16 @@ def write_before_after_recording(path: str | Path, found: Residuals, report: str
 
     The entities are those of a move (see `write_recording`), with these differences:
 
-    /world/boom                 the boom as measured, with solid bodies, at the joint positions of the log
+    /world/boom                 the boom as measured, with solid bodies, at the joint positions of
+                                the log
     /world/before               the boom before: edges only, frames "before <body>" in "mount"
-    /plots/left/<joint>         torque of the log less that of each model; a gap where the joint does not move
+    /plots/left/<joint>         torque of the log less that of each model; a gap where the joint
+                                does not move
     /plots/tau/<joint>          torques of the log and of both models
-    /plots/parts/<joint>        change of each part of the torque from the model before to the one after
-    /plots/left/tip             distance between the tips of the two models, and the remaining standard
-                                deviation of a calibrated boom [mm]
+    /plots/parts/<joint>        change of each part of the torque from the model before to the one
+                                after
+    /plots/left/tip             distance between the tips of the two models, and the remaining
+                                standard deviation of a calibrated boom [mm]
 
     Args:
         path: the .rrd file.

@@ -44,7 +44,7 @@ def motor_bundles(move: Move) -> Iterator[Bundle]:
 
 
 def gearbox_bundles(move: Move) -> Iterator[Bundle]:
-    """Yield the absolute torque of each gearbox together with its ratings and the average of the cycle."""
+    """Yield the absolute torque of each gearbox with its ratings and the average of the cycle."""
     tau = np.abs(move.loads.tau)
     for i, (joint, drive) in enumerate(zip(JOINTS, move.boom.drives, strict=True)):
         if drive is None:

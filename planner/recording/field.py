@@ -29,7 +29,7 @@ _ZOOM = 19.0  # some 300 m across
 def write_field_recording(
     path: str | Path, boom: Boom, rig: Rig, tags: SensorTags, plots: PlotMap | None = None, located: Located | None = None
 ) -> None:
-    """Write geotags as a scene in east, north, up [m], and a map that needs no network for plots and tracks.
+    """Write geotags as a scene in east, north, up [m], and an offline map of plots and tracks.
 
     /world/mount, /world/boom    the boom on the vehicle, at every trigger
     /world/plots                 outlines of the plots, at the height of what was seen

@@ -118,7 +118,7 @@ def part_bundles(parts: Breakdown) -> Iterator[Bundle]:
 
 
 def power_bundles(powers: Sequence[JointPower]) -> Iterator[Bundle]:
-    """Yield the power of each joint: at the joint, and of a known drive what it loses and what it takes."""
+    """Yield the power of each joint: at the joint, and of a known drive its losses and input."""
     for power in powers:
         known = {
             "at the joint": (power.output, SKY_BLUE),

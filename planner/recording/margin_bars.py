@@ -32,7 +32,7 @@ _LABEL_BELOW = 0.6
 
 
 def margin_rows(move: Move, joint: str) -> list[Row]:
-    """Return the checks of a joint's gearbox and motor that have a margin or could not be checked."""
+    """Return a joint's gearbox and motor checks that have a margin or could not be checked."""
     rows = [row for row in move.report.rows if row.joint == joint and row.kind.part in (Part.GEARBOX, Part.MOTOR)]
     return [row for row in rows if row.margin is not None or row.verdict is Verdict.NOT_CHECKABLE]
 

@@ -46,8 +46,8 @@ def write_recording(path: str | Path, move: Move, *, reach: ReachMap | None = No
     /plots/ratio              torque / limit of each driven joint
     /plots/parts/<joint>      gravity, inertia, velocity, payload, friction and vehicle terms, which
                               add up to tau
-    /plots/power/<joint>      power at the joint; loss in windings and gearbox, and electrical power,
-                              of a drive with data [W]
+    /plots/power/<joint>      power at the joint; loss in windings and gearbox, and electrical
+                              power, of a drive with data [W]
     /plots/motor/<joint>      motor torque, available torque, and available torque less the stepper
                               margin [Nm]
     /plots/gearbox/<joint>    gearbox torque, its ratings and the average of the cycle [Nm]

@@ -61,15 +61,16 @@ def bars(boom: Boom) -> dict[str, list[Bar]]:
 
 
 def corners(body: str, bars: list[Bar]) -> tuple[Array, Array]:
-    """Return opposite corners (k, 3) of the bars of a body, along the axes of the body's frame [m]."""
+    """Return opposite corners (k, 3) of the bars of a body, along the axes of its frame [m]."""
     low, high = (np.array([corner(bar) for bar in bars]) @ R_LINK_BODY[body] for corner in (Bar.low, Bar.high))
     return low, high
 
 
 def pins(boom: Boom) -> dict[str, Array]:
-    """Return the middles (k, 3) of the pins in their bodies' frames [m]: shoulder and 6, 8 and 7, wrist.
+    """Return the middles (k, 3) of the pins in their bodies' frames [m].
 
-    Each pin lies along z of its body's frame.
+    These are the shoulder and pin 6, pins 8 and 7, and the wrist. Each pin lies along z of its
+    body's frame.
     """
     along = {"lower": (0.0, boom.geometry.L3), "upper": (0.0, boom.geometry.L5), "end_effector": (0.0,)}
     return {name: np.array([(e, 0.0, 0.0) for e in places]) @ R_LINK_BODY[name] for name, places in along.items()}

@@ -1,4 +1,4 @@
-"""What a move is doing over time: its phase, the limit that decides, and the brakes; with entries of a log."""
+"""What a move is doing over time: phase, deciding limit and brakes; with entries of a log."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Lane:
 
 
 def lanes(move: Move) -> tuple[Lane, ...]:
-    """Return the lanes of a move: phase, active limit and, where a drive has a brake, the brakes."""
+    """Return the lanes of a move: phase, active limit and, where a drive has a brake, brakes."""
     found = [
         Lane("states/phase", phases(move), _PHASES),
         Lane(_LIMIT, active_limits(move), {_NO_LIMIT: GREY}),
@@ -92,7 +92,7 @@ def log_lanes(recording: rr.RecordingStream, t: Array, shown: Sequence[Lane]) ->
 
 
 def log_events(recording: rr.RecordingStream, move: Move, shown: Sequence[Lane]) -> None:
-    """Log an entry where a limit is met, and where the longest and the farthest stop would begin."""
+    """Log an entry where a limit is met, and where the longest and farthest stops would begin."""
     t, (limits,) = move.trajectory.t, [lane.states for lane in shown if lane.entity == _LIMIT]
     for k in _changes(limits):
         if limits[k] != _NO_LIMIT:

@@ -46,7 +46,7 @@ def log_png(recording: rr.RecordingStream, entity: str, png: bytes) -> None:
 
 
 def log_properties(recording: rr.RecordingStream, boom: Boom, report: Report) -> None:
-    """Log what was asked and found as properties of the recording, with the command and the versions."""
+    """Log what was asked and found as recording properties, with the command and the versions."""
     found: dict[str, Any] = {
         "verdict": str(report.verdict),
         "profile": report.profile,

@@ -136,7 +136,7 @@ class Judged:
 
 
 def candidates(boom: Boom, joint: str, catalogue: Catalogue, voltages: Sequence[float] = ()) -> tuple[Drive | LinearDrive, ...]:
-    """Return the `combinations` of a catalogue for a joint of which the motor torque can be checked.
+    """Return the `combinations` of a catalogue for a joint whose motor torque can be checked.
 
     Motors and gearboxes whose datasheets do not give it are left out; see `untried`.
 

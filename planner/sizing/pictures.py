@@ -68,7 +68,7 @@ def sizing_pictures(choices: Sequence[Choice]) -> dict[str, "Figure"]:
 
 
 def _best(choices: Sequence[Choice]) -> list[str]:
-    """Return the names of the first ranked drives with a mass of every choice, one for each colour."""
+    """Return the names of the first ranked drives with a mass of every choice, one per colour."""
     weighed = ([judged.name for judged in choice.judged if judged.mass is not None] for choice in choices)
     ranked = (name for place in zip_longest(*weighed) for name in place if name is not None)
     return list(islice(dict.fromkeys(ranked), len(_COLORS)))

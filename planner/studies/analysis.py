@@ -1,4 +1,8 @@
-"""What a dataset says: quantiles, probability of FAIL, first-order propagation, sensitivity indices, Pareto front."""
+"""Analysis of a study's dataset.
+
+It gives quantiles, the probability of FAIL, first-order propagation, sensitivity indices and the
+Pareto front.
+"""
 
 import re
 from collections.abc import Sequence
@@ -125,7 +129,7 @@ class Results:
     """A dataset with its study."""
 
     def __init__(self, study: Study, path: str | Path) -> None:
-        """Read what every analysis needs of a dataset; its other columns are read when they are asked for."""
+        """Read what every analysis needs of a dataset; other columns are read when asked for."""
         import pyarrow.parquet as pq
 
         self.study = study
@@ -134,7 +138,7 @@ class Results:
         self.names = tuple(self._file.schema_arrow.names)
 
     def column(self, name: str) -> Any:
-        """Return a column as an array over all points: numbers with NaN for missing ones, or objects.
+        """Return a column as an array over all points: numbers (NaN where missing) or objects.
 
         Raises:
             InputError: there is no such column; suggests the nearest.
@@ -180,7 +184,10 @@ class Results:
 
     @cached_property
     def drawn(self) -> Mask:
-        """Which points are a sample of the factors' distributions; of Saltelli's design, its two base samples."""
+        """Which points are a sample of the factors' distributions.
+
+        Of Saltelli's design, these are the points of its two base samples.
+        """
         drawn = np.asarray(self.column("point") == DESIGN)
         if self.study.design.kind is DesignKind.SOBOL_INDICES:
             block = len(self.study.design.factors) + 2
@@ -189,7 +196,7 @@ class Results:
         return drawn
 
     def fails(self, where: Mask | None = None) -> Probability | None:
-        """Return the probability of FAIL over the drawn samples with an answer, or over some of them."""
+        """Return the probability of FAIL over all or some of the drawn samples with an answer."""
         chosen = self.drawn & ~self.refused
         if where is not None:
             chosen = chosen & where
@@ -204,7 +211,10 @@ class Results:
         return tuple(found)
 
     def by_combination(self) -> tuple[tuple[tuple[str, ...], Probability], ...]:
-        """Return the probability of FAIL for each combination of levels; () where one factor at most has levels."""
+        """Return the probability of FAIL for each combination of levels.
+
+        Return () where at most one factor has levels.
+        """
         leveled = [i for i, factor in enumerate(self.study.design.factors) if len(factor.levels) > 1]
         if len(leveled) < 2:
             return ()
@@ -218,9 +228,10 @@ class Results:
         return tuple(found)
 
     def boundary(self) -> tuple[Boundary, ...]:
-        """Return how far the study's bounded factor can go before a sample FAILs, for each combination of the others.
+        """Return how far the study's bounded factor can go before a sample FAILs.
 
-        Levels are taken in ascending order. A refused sample ends the way too. () without such a factor.
+        There is one answer for each combination of the other factors. Levels are taken in ascending
+        order. A refused sample ends the way too. () without such a factor.
         """
         study = self.study
         if study.boundary is None:
@@ -244,15 +255,19 @@ class Results:
         return tuple(found)
 
     def tightest(self) -> tuple[tuple[str, int], ...]:
-        """Return the rows that use most of their limit, and in how many drawn samples, the most frequent first."""
+        """Return the rows that use most of their limit, and in how many drawn samples.
+
+        The most frequent is first.
+        """
         names = [name for name in self.column("tightest")[self.drawn] if name is not None]
         counts = {name: names.count(name) for name in dict.fromkeys(names)}
         return tuple(sorted(counts.items(), key=lambda pair: -pair[1]))
 
     def reasons(self, status: str) -> tuple[tuple[str, int], ...]:
-        """Return the reasons of refused or infeasible points, and how many have them, the most frequent first.
+        """Return the reasons of refused or infeasible points, and how many points have each.
 
-        Reasons that differ in numbers alone are one: that of the first point.
+        The most frequent is first. Reasons that differ in numbers alone are one: that of the first
+        point.
         """
         counts: dict[str, tuple[str, int]] = {}
         for reason in self.column("reason")[self.column("status") == status]:
@@ -392,9 +407,9 @@ class Results:
         return [Index(name, float(first), float(error), None, None) for name, first, error in pairs]
 
     def front(self, names: Sequence[str]) -> Array:
-        """Return the points (k,) of the Pareto front that minimises responses, among those that do not FAIL.
+        """Return the points (k,) of the Pareto front that minimises responses.
 
-        Of points with equal responses, the first stays.
+        Points that FAIL are left out. Of points with equal responses, the first stays.
 
         Raises:
             InputError: there is no such response.

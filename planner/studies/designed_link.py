@@ -45,7 +45,7 @@ def link_task(given: Tree) -> LinkTask | None:
 
 
 def with_designed_link(boom: Boom, task: LinkTask, links: Tree, cycle: Cycle) -> tuple[Boom, float]:
-    """Return the boom with a link of least mass under the loads of a cycle, and the link's mass [kg].
+    """Return the boom with a link of least mass under a cycle's loads, and the link's mass [kg].
 
     As `design_link` by the exact method on the loads of moves, without its comparisons.
 

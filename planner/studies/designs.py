@@ -1,4 +1,4 @@
-"""Designs of experiments: the points of a study, in a fixed order that depends on the study alone."""
+"""Designs of experiments: the points of a study, in a fixed order set by the study alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -88,7 +88,10 @@ class Factor:
         return 0.0 if self.shape is None else float(self._distribution.std())
 
     def around(self) -> tuple[float, ...]:
-        """Return the coordinates of its one-at-a-time points: a deviation either way, or every other level."""
+        """Return the coordinates of its one-at-a-time points.
+
+        These are a deviation either way, or every other level.
+        """
         if self.shape is None:
             return tuple(float(i) for i in range(1, len(self.levels)))
         return self.nominal - self.deviation, self.nominal + self.deviation

@@ -106,7 +106,10 @@ def _indices(name: str, indices: list[Index], exact: bool) -> "Figure":
 
 
 def _scatter(results: Results, response: str, factor: Factor) -> "Figure":
-    """Draw a response over a factor; samples without a motion, which have no response, stand at the top."""
+    """Draw a response over a factor.
+
+    Samples without a motion have no response and stand at the top.
+    """
     figure, axes = _figure()
     i = results.study.design.factors.index(factor)
     chosen = np.flatnonzero(results.drawn & ~results.refused)[:_MOST_DOTS]
@@ -136,7 +139,7 @@ def _scatter(results: Results, response: str, factor: Factor) -> "Figure":
 
 
 def _grid_map(results: Results) -> "Figure | None":
-    """Return a map over the two factors that decide most: the share of the other combinations that FAIL."""
+    """Return a map over the two most decisive factors: share of other combinations that FAIL."""
     design = results.study.design
     counts = [len(factor.levels) for factor in design.factors]
     if sum(count > 1 for count in counts) < 2:

@@ -122,7 +122,10 @@ def level_rows(results: Results) -> list[tuple[str, ...]]:
 
 
 def combination_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return header and rows of the probability of FAIL by combination of levels; no rows where there are many."""
+    """Return header and rows of the probability of FAIL by combination of levels.
+
+    There are no rows where there are many combinations.
+    """
     names = [factor.name for factor in results.study.design.factors if len(factor.levels) > 1]
     found = results.by_combination()
     rows = [(*shown, percent(p.estimate), f"{percent(p.low)} to {percent(p.high)}", f"{p.samples:,}") for shown, p in found]
@@ -145,9 +148,10 @@ def boundary_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ..
 
 
 def front_points(results: Results) -> list[dict[str, Value]]:
-    """Return the points of the Pareto front: the responses of which the least are sought, and the factors that vary.
+    """Return the points of the Pareto front.
 
-    () where the study has none.
+    Each has the responses of which the least are sought, and the factors that vary. () where the
+    study has none.
     """
     study = results.study
     if not study.pareto:
@@ -163,7 +167,7 @@ def front_points(results: Results) -> list[dict[str, Value]]:
 
 
 def front_rows(results: Results) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return header and rows of the Pareto front as people read it; no rows where the study has none."""
+    """Return header and rows of the Pareto front as people read it; no rows where there is none."""
     points = front_points(results)
     header = tuple(label(name)[0] for name in points[0]) if points else ()
     return header, [tuple(_value(value, label(name)[1]) for name, value in point.items()) for point in points]
@@ -253,7 +257,10 @@ def _indexed(results: Results, found: Sequence[ResponseSummary]) -> list[tuple[s
 
 
 def _short(then: str | None) -> str:
-    """Return the end of a way in few words: of a sentence about a mission, what is out of reach or too fast."""
+    """Return the end of a way in few words.
+
+    Of a sentence about a mission, this is what is out of reach or too fast.
+    """
     if then is None:
         return "nothing up to the largest level"
     return re.sub(r"^mission .*?, steps [^:]*: ", "", then).partition(";")[0]

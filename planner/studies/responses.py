@@ -36,7 +36,7 @@ def label(name: str) -> tuple[str, float]:
 
 
 def unknown_response(name: str, known: Iterable[str]) -> InputError:
-    """Return the error of a response that no sample has; the nearest of the known ones is suggested."""
+    """Return the error of a response that no sample has; it suggests the nearest known one."""
     meant = nearest_name(name, known)
     hint = "every column of the dataset that holds numbers is one" if meant is None else f"did you mean {meant}?"
     return InputError(f"unknown response {name!r}; {hint}")
@@ -88,7 +88,10 @@ def _times(cycle: Cycle) -> Columns:
 
 
 def _masses(boom: Boom) -> Columns:
-    """Yield the masses of bodies and drives; a boom's file does not say whether its bodies include their drives."""
+    """Yield the masses of bodies and drives.
+
+    A boom's file does not say whether its bodies include their drives.
+    """
     drives = [mass for drive in (*boom.drives, boom.actuator) if drive is not None and (mass := _drive_mass(drive)) is not None]
     yield "bodies_kg", boom.mass
     yield "drives_kg", float(sum(drives))
@@ -111,7 +114,10 @@ def _energies(energy: Energy) -> Columns:
 
 
 def _rows(rows: Sequence[Row]) -> Columns:
-    """Yield the tip's error, and for every row that has them its margin and the share of its limit that is used."""
+    """Yield the tip's error, and the margin and the used share of the limit of every row.
+
+    What a row does not have is left out.
+    """
     for row in rows:
         if row.kind is CheckKind.TIP_DEFLECTION:
             yield "tip_error_m", row.demand

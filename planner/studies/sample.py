@@ -1,4 +1,4 @@
-"""One sample of a study, and a chunk of them as a table: from the factors' values to the responses."""
+"""One sample of a study, and a chunk of them as a table: from factors' values to responses."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -137,7 +137,7 @@ def _with_profile(steps: Any, profile: Value) -> list[Any]:
 
 
 def _column(values: list[Any]) -> "pa.Array":
-    """Return a column of numbers, texts or nothing at all, of a type that does not depend on the chunk."""
+    """Return a column of numbers, texts or nothing, of a type that does not depend on the chunk."""
     import pyarrow as pa
 
     known = [value for value in values if value is not None]

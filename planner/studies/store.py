@@ -1,4 +1,4 @@
-"""The dataset of a study: finished chunks as files beside it, joined into one Parquet file at the end."""
+"""Dataset of a study: finished chunks as files beside it, joined at the end as one Parquet file."""
 
 import fcntl
 import hashlib
@@ -104,7 +104,9 @@ class Store:
             pq.write_table(table, temporary)
 
     def join(self, path: str | Path) -> None:
-        """Write all chunks as one Parquet file. It depends on the study alone, not on its chunks' size.
+        """Write all chunks as one Parquet file.
+
+        It depends on the study alone, not on the size of its chunks.
 
         Raises:
             InputError: it cannot be written.

@@ -84,7 +84,7 @@ def require_key(tree: Tree, key: str, where: str) -> Any:
 
 
 def filled(tree: Any, values: Mapping[str, Value]) -> Any:
-    """Return a copy with every placeholder {name} in its texts replaced by the value of that name."""
+    """Return a copy with every placeholder {name} in its texts replaced by that name's value."""
     if isinstance(tree, dict):
         return {key: filled(value, values) for key, value in tree.items()}
     if isinstance(tree, list):

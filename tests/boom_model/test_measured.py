@@ -1,4 +1,4 @@
-"""What was measured: its place in the boom's file, its use in dynamics and checks, its basis in a report."""
+"""Measured figures: place in the boom's file, use in dynamics and checks, basis in reports."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -79,7 +79,10 @@ def test_measured_figures_are_named_once_for_each_log():
 
 
 def test_torques_of_a_measured_boom_do_not_weaken_a_rows_basis():
-    """A row is as good as its weakest figure: the friction that was assumed is measured, and the limit stays printed."""
+    """A row is as good as its weakest figure.
+
+    The friction that was assumed is measured, and the limit stays printed.
+    """
     boom, move = Boom.load(), main_move("cubic", step=0.05).trajectory
     assumed = replace(boom, friction=replace(boom.friction, origins=(replace(LOG, basis=Basis.ASSUMED),) * 5))
     bases = {}

@@ -1,4 +1,4 @@
-"""Uncertainty of the tip by a calibration: linear theory against random booms, and what a report makes of it."""
+"""Uncertainty of the tip by a calibration: linear theory against random booms, and its report."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def calibrated(boom: Boom = SHIPPED, spread=SPREAD, unequal: bool = True) -> Boo
 
 
 def tip_of(boom: Boom, by: np.ndarray, q: np.ndarray, tau: np.ndarray) -> np.ndarray:
-    """The tip (3,) of a boom whose figures are off by `by`, at the readings of q (5,) under torques tau (5,)."""
+    """The tip (3,) of a boom whose figures are off by `by`, at readings of q (5,) with tau (5,)."""
     error, known, g = dict(zip(NAMES, by, strict=True)), boom.calibration, boom.geometry
     lengths = {name: getattr(g, name) + error[name] for name in ("L2", "L3", "L4", "L6", "L7", "L8")}
     lengths |= {"upper_less_lower": g.upper_less_lower + error[UPPER], "inner_less_outer": g.inner_less_outer + error[INNER]}

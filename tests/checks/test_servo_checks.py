@@ -174,7 +174,7 @@ def test_a_printed_L10_is_the_life_at_rated_torque_and_speed(name, hours):
 
 
 def test_a_planetary_gearbox_bears_its_peak_as_often_as_the_sheet_says():
-    """1000 emergency stops, however long they last; and no life of a strain wave is read into it."""
+    """1000 emergency stops of any duration; and no life of a strain wave is read into it."""
     drive = replace(DRIVE, gearbox=Catalogue.load().gearboxes["TP010-10"])
     motion = joint_view(tau=200.0, qd=[10 * RPM, 99.0], t=[0.0, 1.0])
     for events, verdict in ((1000.0, Verdict.PASS), (1010.0, Verdict.FAIL), (None, Verdict.NOT_CHECKABLE)):

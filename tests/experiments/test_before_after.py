@@ -1,4 +1,7 @@
-"""A log beside two models: residuals, what takes them away, report and recording, and chained measurements."""
+"""A log beside two models: residuals, what takes them away, report and recording.
+
+Calibration and identification are also chained, one after the other.
+"""
 
 import json
 from dataclasses import replace

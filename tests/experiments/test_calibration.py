@@ -300,7 +300,10 @@ ANCHORS = np.array([[2.0, 0.0, 0.2], [-1.0, 2.0, 0.0], [-1.0, -2.0, 0.5]])
 
 
 def taped(rng, boom, offset, q, place):
-    """Rows of a file: readings, distance from each anchor, anchor. The boom stands a little elsewhere than it is thought to."""
+    """Rows of a file: readings, distance from each anchor, anchor.
+
+    The boom stands a little elsewhere than it is thought to.
+    """
     at = q - printed_wind_up(boom, q)
     tips = forward_kinematics(boom, at).position @ place[0].T + place[1]
     rows = []

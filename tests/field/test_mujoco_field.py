@@ -43,7 +43,7 @@ class Simulated(NamedTuple):
 
 @pytest.fixture(scope="module")
 def field() -> Simulated:
-    """Every millisecond of joints and points, from MuJoCo; servos with feed-forward move the boom."""
+    """Every millisecond of joints and points, from MuJoCo; feed-forward servos move the boom."""
     boom, drive = without_drives(Boom.load()), Drive()
     model, data = _model(boom)
     steps = int(SECONDS / STEP)

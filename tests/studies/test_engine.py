@@ -99,7 +99,7 @@ def test_a_row_is_its_sample_computed_alone(folder):
 
 
 def test_the_dataset_does_not_depend_on_the_size_of_chunks(folder, monkeypatch):
-    """Nor do its types: a factor of numbers and words, and a refused sample that has no response."""
+    """Nor do its types: a factor of numbers and words, and a refused sample without a response."""
     monkeypatch.setattr("planner.studies.store._GROUP", 16)
     made = []
     for chunk in (3, 16, 50):

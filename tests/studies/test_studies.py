@@ -277,7 +277,10 @@ def test_the_probability_of_a_hold_is_the_normal_one(loaded, tmp_path):
 
 
 def test_first_order_propagation_agrees_with_the_samples_of_tolerance(tmp_path):
-    """Its responses are almost linear in its factors; 128 points of Sobol's sequence give a deviation to 2 %."""
+    """Its responses are almost linear in its factors.
+
+    128 points of Sobol's sequence give a deviation to 2 %.
+    """
     text = named_file(NAMED_STUDIES, "tolerance", "study").read_text()
     for old, new in (('"sobol-indices"', '"sobol"'), ("samples = 512", "samples = 128")):
         assert old in text

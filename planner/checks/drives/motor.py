@@ -1,4 +1,4 @@
-"""Checks of a motor and its gearbox against the motor's datasheet; a servo motor has its own rows."""
+"""Checks of motor and gearbox against the motor's datasheet; a servo motor has its own rows."""
 
 from collections.abc import Iterator
 from functools import reduce

@@ -1,4 +1,4 @@
-"""Error budget of the tip: wind-up, backlash, hysteresis, step error, and the geometry as far as it was measured."""
+"""Error budget of the tip: wind-up, backlash, hysteresis, step error and calibrated geometry."""
 
 from collections.abc import Iterator
 
@@ -17,7 +17,8 @@ def tip_rows(boom: Boom, trajectory: Trajectory, tau: Array, duty: Duty, M: Arra
     """Return the rows of the tip.
 
     These are the largest value of each part of the error budget, the calibration's remaining
-    uncertainty among them, the largest sum against the tolerance, and the first natural frequency of the arm on its gearboxes.
+    uncertainty among them, the largest sum against the tolerance, and the first natural frequency
+    of the arm on its gearboxes.
 
     Args:
         boom: the boom.
