@@ -242,7 +242,7 @@ def _along_log(
     if log is None:
         raise InputError("--rig says where the antenna of a log is; give the log by --track")
     asked = {"speed": task.speed, "passes": task.passes, "offset": task.offset}
-    unfit = [name for name in written if name not in ("plots", "picture")]
+    unfit = [name for name in written if name not in ("mission", "plots", "picture")]
     unfit += [name for name, value in asked.items() if value is not None]
     if unfit:
         raise InputError(f"--{unfit[0]} does not go with --track: the log gives the track and the speed")
@@ -251,7 +251,11 @@ def _along_log(
         "coverage": [round(float(x), 4) for x in found.coverage],
         "reason": [found.unreachable.get(name, "") for name in field.names],
     }
+    mission = found.mission if "mission" in written else ""
     with files:
+        if "mission" in written:
+            with open(files.temporary(written["mission"]), "w", encoding="utf-8") as file:
+                file.write(mission)
         if "plots" in written:
             write_plots(field, files.temporary(written["plots"]), columns)
         if "picture" in written:
@@ -261,9 +265,7 @@ def _along_log(
     else:
         _print_track(found, whole)
         print_files(written)
-        print_lines(
-            "next", ["look at the plots in QGIS"] if "plots" in written else ["add --out plots.geojson --picture scan.png"]
-        )
+        print_lines("next", [f"boom mission {written['mission']}" if "mission" in written else "add --mission scan.toml"])
     failed = _track_failed(found)
     if failed:
         complain(failed)
@@ -271,8 +273,13 @@ def _along_log(
 
 
 def _track_failed(found: "TrackScan") -> str:
+    from planner.checks.rows import Verdict
+
     fast, lost, n = [each.worst for each in found.passes if each.worst > 1.0], found.unreachable, len(found.plots.names)
     said = [f"{len(fast)} passes are too fast for the boom, the worst at {max(fast):.2f} of a limit"] if fast else []
+    moves = [each.move for each in found.reached] + [way.move for way in found.ways]
+    bad = [move for move in moves if move is not None and move.report.verdict is Verdict.FAIL]
+    said += [f"{len(bad)} moves FAIL"] if bad and not fast else []
     reason = next((each.reason for each in found.passes if each.reason), next(iter(lost.values()), ""))
     return "; ".join(said + ([f"{len(lost)} of {n} plots are not reached whole: {reason}"] if lost else []))
 

@@ -39,6 +39,9 @@ def test_scan_along_a_log(boom, tmp_path):
     code, _, error = boom(*asked, "--speed", "0.5")
     assert code == 2
     assert "--speed does not go with --track: the log gives the track and the speed" in error
-    assert boom(*asked, "--mission", "m.toml")[0] == 2
+    assert boom(*asked, "--mission", "m.toml")[0] == 1
+    code, out, _ = boom("mission", "m.toml")
+    assert code == 0
+    assert "row scan" in out
     assert "give the log by --track" in boom(*asked[:-2], "--rig", "rig.toml")[2]
     assert "passes are driven at a speed" in boom(*asked[:-2], "--passes", "2")[2]

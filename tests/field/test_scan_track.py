@@ -1,18 +1,22 @@
 """Scans along a log: the tip's way from the planned joints and the true motion of the mount."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from boom_model import Boom, InputError, forward_kinematics, inverse_dynamics
+from boom_model import Boom, InfeasibleError, InputError, forward_kinematics, inverse_dynamics
+from planner.checks.rows import Verdict
 from planner.field import attitude
 from planner.field.earth import geodetic_of
 from planner.field.rig import read_rig
 from planner.field.scan_task import ScanTask
-from planner.field.scan_track import scan_along
+from planner.field.scan_track import LEAD, scan_along
 from planner.field.vehicle_log import VehicleLog
+from planner.missions.mission import load_mission, plan_cycle
 from planner.timing.limit_ratios import Limit
 from tests.field.field_files import RIG
-from tests.field.weave import Weave
+from tests.field.weave import BACK, BEYOND, SPEED, Weave
 
 BOOM = Boom.load()
 TASK = ScanTask((0.5, 0.5))
@@ -59,7 +63,62 @@ def test_limits_count_the_motion_of_the_mount(along):
     tau = inverse_dynamics(BOOM, motion.q, motion.qd, motion.qdd, base=base, friction=True, reactions=False).tau
     assert np.abs(tau - still).max() > 1.0
     assert each.worst < 1.0
-    assert each.ratios[Limit.VELOCITY] == pytest.approx((np.abs(motion.qd) / BOOM.limits.velocity).max(), rel=1e-9)
+    whole = each.move.trajectory  # from rest to rest
+    assert each.ratios[Limit.VELOCITY] == pytest.approx((np.abs(whole.qd) / BOOM.limits.velocity).max(), rel=1e-9)
+
+
+def test_the_boom_comes_from_rest_and_to_rest(along):
+    """Before and after the pass, velocities are those of the positions, and nothing jumps."""
+    for each in along.passes:
+        whole = each.move.trajectory
+        assert np.abs(whole.qd[[0, -1]]).max() < 1e-9
+        assert np.abs(whole.qdd[[0, -1]]).max() < 1e-9
+        assert np.abs(np.gradient(whole.q, whole.t, axis=0) - whole.qd)[1:-1].max() < 1e-3
+        assert np.abs(np.diff(whole.qdd, axis=0)).max() < 0.02
+        assert whole.duration == pytest.approx(each.trajectory.duration + 2.0 * LEAD)
+        assert each.move.report.verdict is not Verdict.FAIL
+    assert all(way.move.report.verdict is not Verdict.FAIL for way in along.ways)
+
+
+def test_the_mission_puts_the_tip_on_its_lines_at_the_times_of_the_log(weave, along, tmp_path):
+    """Legs of the file as boom mission reads it, with the true pose of the vehicle at these times."""
+    (tmp_path / "scan.toml").write_text(along.mission)
+    mission = load_mission(str(tmp_path / "scan.toml"))
+    assert mission.plots == 4
+    cycle = plan_cycle(BOOM, mission)
+    begin, number = along.passes[0].curve.mount.begin - LEAD, 0
+    for leg in cycle.legs[1:-1]:
+        if leg.label == "a motion of the file":
+            t = np.linspace(LEAD, leg.trajectory.duration - LEAD, 400)
+            q = np.stack([np.interp(t, leg.trajectory.t, column) for column in leg.trajectory.q.T], axis=-1)
+            place, R = weave.pose(begin + t)
+            ground = place + np.einsum("nij,nj->ni", R, forward_kinematics(BOOM, q).position)
+            across = (ground[:, :2] - weave.row.middle) @ weave.row.left
+            assert np.abs(across - (-0.35 + 0.35 * number)).max() < 1e-3
+            number += 1
+        begin += leg.trajectory.duration
+    assert number == 3
+    last = along.passes[-1].curve.mount
+    assert begin == pytest.approx(last.begin + last.duration + LEAD, abs=1e-3)
+    assert "level ground" in along.mission
+
+
+def test_a_line_that_the_tip_does_not_reach_in_time_is_named(weave):
+    """Joints thirty times slower: the extension takes more than the vehicle's way back."""
+    slow = replace(BOOM, limits=replace(BOOM.limits, velocity=BOOM.limits.velocity / 30.0))
+    found = scan_along(slow, weave.plots, TASK, weave.log())
+    gap = 2.0 * BEYOND / SPEED + weave.length / BACK - 2.0 * LEAD
+    assert [each.move is None for each in found.passes] == [False, True, False]
+    assert found.passes[1].reason.startswith("the tip takes ")
+    assert found.passes[1].reason.endswith(f"m beside the mount; the log leaves {gap:.1f} s")
+    assert found.unreachable["1-1"].startswith("the tip takes ")
+    assert found.passes[0].worst > 1.0
+
+
+def test_no_line_in_reach_is_no_mission(weave):
+    far = scan_along(BOOM, weave.plots, ScanTask((0.5, 0.5), tip_height=4.0), weave.log())
+    with pytest.raises(InfeasibleError, match=r"log\.csv: no line is reached, so there is nothing to do: on the line"):
+        _ = far.mission
 
 
 def test_the_motion_of_the_mount_is_that_of_the_vehicle(weave, along):
