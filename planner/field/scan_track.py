@@ -98,6 +98,8 @@ class Pass:
     reason: str
     ratios: dict[Limit, float]
     """Largest demand over limit from rest to rest, with the mount's motion."""
+    late: bool = False
+    """Whether the boom is not there in time."""
 
     @property
     def speed(self) -> float:
@@ -158,18 +160,29 @@ class TrackScan:
         """
         return track_mission(self)
 
-    @cached_property
+    @property
     def coverage(self) -> Array:
         """(plots,) share of each plot that is seen."""
+        return self._looks[0]
+
+    @property
+    def overlap(self) -> Array:
+        """(plots,) area seen over that seen at least once; 0 where nothing is."""
+        return self._looks[1]
+
+    @cached_property
+    def _looks(self) -> tuple[Array, Array]:
         shapely = library("shapely")
-        shares = np.zeros(len(self.plots.names))
+        shares, times = np.zeros((2, len(self.plots.names)))
         if not any(len(each) for each in self.footprints):
-            return shares
+            return shares, times
         shapes = shapely.polygons(np.concatenate([each for each in self.footprints if len(each)]))
         for k, touched in _by_plot(self.plots, shapes).items():
             polygon = self.plots.polygons[k]
-            shares[k] = shapely.intersection(shapely.union_all(shapes[touched]), polygon).area / polygon.area
-        return shares
+            pieces = shapely.intersection(shapes[touched], polygon)
+            seen = shapely.union_all(pieces).area
+            shares[k], times[k] = seen / polygon.area, shapely.area(pieces).sum() / max(seen, 1e-12)
+        return shares, times
 
     @property
     def unreachable(self) -> dict[str, str]:
@@ -215,7 +228,7 @@ def scan_along(boom: Boom, plots: PlotMap, task: ScanTask, log: VehicleLog, rig:
         each = _pass(boom, task, row, float(lines[number]), fitted(mount, first, end), here)
         if last is not None and each.move is not None:
             way, late = _joined(boom, task, last, each)
-            each = each if not late else replace(each, move=None, trajectory=None, ratios={}, reason=late)
+            each = each if not late else replace(each, move=None, trajectory=None, ratios={}, reason=late, late=True)
             ways += [way] if way is not None else []
         last = last if each.move is None else each
         passes.append(each)

@@ -39,7 +39,15 @@ def test_scan_along_a_log(boom, tmp_path):
     code, _, error = boom(*asked, "--speed", "0.5")
     assert code == 2
     assert "--speed does not go with --track: the log gives the track and the speed" in error
-    assert boom(*asked, "--mission", "m.toml")[0] == 1
+    files = ("--mission", "m.toml", "--recording", "log.rrd", "--report", "log.md", "--picture", "log.png", "--out", "log.csv")
+    code, out, _ = boom(*asked, *files)
+    assert code == 1
+    report = (tmp_path / "log.md").read_text()
+    assert "FAIL: 36 of 40 plots are not reached whole" in report
+    assert "## Ways from line to line" in report
+    assert (tmp_path / "log.csv").read_text().startswith("plot,row,range,coverage,overlap,reason,wkt")
+    entities = set(RrdReader(tmp_path / "log.rrd").store().schema().entity_paths())
+    assert {"/map/plots", "/map/vehicle", "/world/plots", "/world/footprint", "/answer"} <= entities
     code, out, _ = boom("mission", "m.toml")
     assert code == 0
     assert "row scan" in out

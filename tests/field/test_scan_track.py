@@ -10,13 +10,15 @@ from planner.checks.rows import Verdict
 from planner.field import attitude
 from planner.field.earth import geodetic_of
 from planner.field.rig import read_rig
+from planner.field.scan import plan_scan
 from planner.field.scan_task import ScanTask
+from planner.field.scan_timeline import seen_so_far, timeline
 from planner.field.scan_track import LEAD, scan_along
 from planner.field.vehicle_log import VehicleLog
 from planner.missions.mission import load_mission, plan_cycle
 from planner.timing.limit_ratios import Limit
 from tests.field.field_files import RIG
-from tests.field.weave import BACK, BEYOND, SPEED, Weave
+from tests.field.weave import BACK, BEYOND, OFFSET, SPEED, Weave
 
 BOOM = Boom.load()
 TASK = ScanTask((0.5, 0.5))
@@ -81,7 +83,7 @@ def test_the_boom_comes_from_rest_and_to_rest(along):
 
 
 def test_the_mission_puts_the_tip_on_its_lines_at_the_times_of_the_log(weave, along, tmp_path):
-    """Legs of the file as boom mission reads it, with the true pose of the vehicle at these times."""
+    """Legs of the file as boom mission reads it, with the vehicle's true pose at these times."""
     (tmp_path / "scan.toml").write_text(along.mission)
     mission = load_mission(str(tmp_path / "scan.toml"))
     assert mission.plots == 4
@@ -101,6 +103,50 @@ def test_the_mission_puts_the_tip_on_its_lines_at_the_times_of_the_log(weave, al
     last = along.passes[-1].curve.mount
     assert begin == pytest.approx(last.begin + last.duration + LEAD, abs=1e-3)
     assert "level ground" in along.mission
+
+
+def test_the_timeline_is_that_of_the_log(weave, along):
+    """Mount and joints of the recording's day against the true motion, without jumps."""
+    step = 0.1
+    line = timeline(BOOM, along, step)
+    t = along.passes[0].span[0] + line.t
+    place, R = weave.pose(t)
+    assert line.t[-1] == pytest.approx(along.duration, abs=2.0 * step)
+    assert (np.diff(line.t) > 0.0).all()
+    assert np.abs(line.place - place).max() < 0.04  # between passes the log's 20 Hz, where the vehicle turns about
+    assert np.abs(line.R - R)[line.looking].max() < 1e-3
+    assert (np.abs(np.diff(line.q, axis=0)) <= 1.01 * step * BOOM.limits.velocity).all()
+    tips = line.tips(BOOM)[line.looking]
+    across = (tips[:, :2] - weave.row.middle) @ weave.row.left
+    assert np.abs(across[:, None] - [-0.35, 0.0, 0.35]).min(axis=1).max() < 1e-3
+    assert line.looking.sum() == pytest.approx(sum(each.curve.mount.duration for each in along.passes) / step, abs=6)
+
+
+def test_what_was_seen_so_far_ends_at_the_coverage(along):
+    seen = seen_so_far(BOOM, along, 20.0)
+    assert (np.diff(seen.share, axis=0) >= 0.0).all()
+    assert seen.share[-1] == pytest.approx(along.coverage, abs=0.015)  # on points 5 cm apart
+
+
+def test_a_straight_log_sees_what_the_line_of_the_row_sees():
+    """The same three lines past a row, from a log at a constant speed and from `plan_scan`."""
+    straight = Weave(sway=0.0)
+    by_log = scan_along(BOOM, straight.plots, TASK, straight.log())
+    by_line = plan_scan(BOOM, straight.plots, replace(TASK, speed=SPEED, offset=OFFSET, profile="cubic"))
+    mine = np.array(straight.plots.rows) == 1
+    assert by_log.coverage[mine] == pytest.approx(by_line.coverage[mine], abs=1e-6)
+    once = 3 * (0.25 * 0.5) / (1.2 * 3.6)  # one more image of half a footprint at an end of each line
+    assert by_log.overlap[mine] == pytest.approx(by_line.overlap[mine], abs=once)
+    assert by_line.coverage[mine].min() > 0.9999
+
+
+def test_two_of_three_lines_see_their_share():
+    """Lines of 0.5 m, 0.35 m apart: 0.85 m of a plot's 1.2 m."""
+    straight = Weave(passes=2, sway=0.0)
+    found = scan_along(BOOM, straight.plots, TASK, straight.log())
+    mine = np.array(straight.plots.rows) == 1
+    assert found.coverage[mine] == pytest.approx(np.full(4, 0.85 / 1.2), abs=1e-4)
+    assert "takes 3 lines" in found.unreachable["1-1"]
 
 
 def test_a_line_that_the_tip_does_not_reach_in_time_is_named(weave):
