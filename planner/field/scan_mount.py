@@ -15,7 +15,7 @@ from planner.field.vehicle_log import VehicleLog
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-_KNOT = 1.0  # [s] between knots of the mount's motion
+_KNOT, _FIXES = 1.0, 3.0  # between knots of the mount's motion: [s], and fixes at least
 _BEYOND = 2.0  # [s] of the log on both sides of a pass that are fitted as well
 
 
@@ -34,6 +34,20 @@ class LoggedMount:
         """Return positions (m, 3) [m] and R_enu_mount (m, 3, 3) at t (m,), linear between fixes."""
         values = [np.interp(t, self.t, column) for column in (*self.place.T, *self.angles.T)]
         return np.stack(values[:3], axis=-1), attitude.rotation(*values[3:])
+
+    @property
+    def knot(self) -> float:
+        """Time between knots of the smooth motion [s]; a longer time without a fix is a gap."""
+        return max(_KNOT, _FIXES * float(np.median(np.diff(self.t))))
+
+    def gap(self, begin: float, end: float) -> tuple[float, float] | None:
+        """Return begin and duration [s] of the first gap between two times, if there is one."""
+        a, b = int(np.searchsorted(self.t, begin, side="right")) - 1, int(np.searchsorted(self.t, end)) + 1
+        steps = np.diff(self.t[max(a, 0) : b])
+        if not (steps > self.knot).any():
+            return None
+        at = int(np.argmax(steps > self.knot))
+        return float(self.t[max(a, 0) + at]), float(steps[at])
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +89,16 @@ def logged_mount(log: VehicleLog, plots: PlotMap, rig: Rig | None) -> LoggedMoun
 
 
 def fitted(mount: LoggedMount, first: int, last: int) -> MountMotion:
-    """Return the smooth motion of the mount between two fixes."""
+    """Return the smooth motion of the mount between two fixes without a gap."""
     from scipy.interpolate import make_lsq_spline
 
     t = mount.t
     a = int(np.searchsorted(t, t[first] - _BEYOND))
     b = int(np.searchsorted(t, t[last] + _BEYOND, side="right"))
+    gaps = np.flatnonzero(np.diff(t) > mount.knot)
+    a, b = max([a, *(gaps[gaps < first] + 1)]), min([b, *(gaps[gaps >= last] + 1)])
     since, values = t[a:b] - t[first], np.column_stack([mount.place[a:b], mount.angles[a:b]])
-    inner = np.linspace(since[0], since[-1], max(2, int((since[-1] - since[0]) / _KNOT)))[1:-1]
+    inner = np.linspace(since[0], since[-1], max(2, int((since[-1] - since[0]) / mount.knot)))[1:-1]
     knots = np.concatenate([[since[0]] * 6, inner, [since[-1]] * 6])
     spline = make_lsq_spline(since, values, knots, k=5)
     off = np.linalg.norm(spline(since)[:, :3] - values[:, :3], axis=1)

@@ -218,7 +218,13 @@ def scan_along(boom: Boom, plots: PlotMap, task: ScanTask, log: VehicleLog, rig:
     ways: list[Way] = []
     counts: dict[int, int] = {}
     last: Pass | None = None
+    gaps: list[str] = []
     for row, first, end in _ways(rows, mount):
+        gap = mount.gap(mount.t[first] - LEAD, mount.t[end] + LEAD)
+        if gap is not None:
+            why = f"no fix for {gap[1]:.1f} s from {gap[0]:.10g} s on"
+            gaps.append(f"{log.source}: {why}; that pass along row {row.number} is left out")
+            continue
         lines = lines_of(row, task)
         number = counts.get(row.number, 0)
         if number >= len(lines):
@@ -233,12 +239,13 @@ def scan_along(boom: Boom, plots: PlotMap, task: ScanTask, log: VehicleLog, rig:
         last = last if each.move is None else each
         passes.append(each)
     if not passes:
-        raise InputError(f"{log.source}: it passes no row of {plots.source} on its left, {_NEAR:g} to {_FAR:g} m away")
+        missed = f"{log.source}: it passes no row of {plots.source} on its left, {_NEAR:g} to {_FAR:g} m away"
+        raise InputError("; ".join([missed, *gaps]))
     notes = () if rig is not None else (f"{log.source}: taken as the mount's own position and attitude (assumed; --rig)",)
     prints = tuple(_prints(boom, task, each) for each in passes)
     return TrackScan(
         task, plots, log.source, tuple(passes), tuple(ways), {row.number: len(lines_of(row, task)) for row in rows}, prints,
-        mount, (*notes, SWAY, *log.notes, *log.warnings),
+        mount, (*gaps, *notes, SWAY, *log.notes, *log.warnings),
     )  # fmt: skip
 
 

@@ -204,6 +204,31 @@ def test_rtk_noise_leaves_the_tip_within_a_centimetre(weave):
     assert each.curve.mount.residual == pytest.approx(0.0143 * np.sqrt(3.0), rel=0.1)
 
 
+@pytest.mark.parametrize("seconds", [2.0, 20.0])
+def test_a_gap_is_named_and_its_pass_left_out(weave, seconds):
+    """The next passes take the lines from the first on; a gap between passes does not matter."""
+    log = weave.log()
+    begin = 10.0
+    kept = ~((log.t > begin) & (log.t < begin + seconds)) & ~((log.t > 50.0) & (log.t < 55.0))
+    latitude, longitude, height = (column[kept] for column in log.geodetic)
+    gappy = VehicleLog.of(log.t[kept], latitude, longitude, height, *log.angles[kept].T, source="log.csv")
+    found = scan_along(BOOM, weave.plots, TASK, gappy)
+    assert [round(each.curve.mount.begin) for each in found.passes] == [69, 134]
+    assert found.notes[0] == f"log.csv: no fix for {seconds:.1f} s from 10 s on; that pass along row 1 is left out"
+    assert "the vehicle passes 2 times with row 1 on its left; it takes 3 lines" in found.unreachable["1-1"]
+
+
+def test_a_log_of_one_fix_a_second(weave):
+    """Knots 3 s apart cannot follow a weave of 8 s as well: some 10 mm."""
+    log = weave.log()
+    latitude, longitude, height = (column[::20] for column in log.geodetic)
+    slow = VehicleLog.of(log.t[::20], latitude, longitude, height, *log.angles[::20].T, source="log.csv")
+    each = scan_along(BOOM, weave.plots, TASK, slow).passes[0]
+    t = np.linspace(0.0, each.curve.mount.duration, 200)
+    off = each.curve.mount.pose(t)[0] - weave.pose(each.curve.mount.begin + t)[0]
+    assert np.linalg.norm(off, axis=1).max() < 0.03
+
+
 def test_a_log_elsewhere_is_refused(weave):
     place, R = weave.pose(weave.t)
     ecef = weave.plots.frame.ecef(place + np.array([0.0, 200.0, 0.0]))
