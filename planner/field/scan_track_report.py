@@ -25,9 +25,11 @@ def track_failed(scan: TrackScan) -> str:
     """Return why the answer is no: a pass is too fast, a move fails, or a plot is not reached."""
     fast, lost, n = [each.worst for each in scan.passes if each.worst > 1.0], scan.unreachable, len(scan.plots.names)
     said = [f"{len(fast)} passes are too fast for the boom, the worst at {max(fast):.2f} of a limit"] if fast else []
-    moves = [each.move for each in scan.reached] + [way.move for way in scan.ways]
-    bad = [move for move in moves if move is not None and move.report.verdict is Verdict.FAIL]
-    said += [f"{len(bad)} moves FAIL"] if bad and not fast else []
+    moves = [(f"the pass {each.line:.2f} m beside the mount", each.move) for each in scan.reached]
+    moves += [(f"the way to {way.target}", way.move) for way in scan.ways]
+    bad = [(name, move) for name, move in moves if move is not None and move.report.verdict is Verdict.FAIL]
+    for name, move in bad[:1]:
+        said.append(f"{len(bad)} moves FAIL, the first {name}: {move.report.summary.removeprefix('FAIL: ').partition(';')[0]}")
     reason = next((each.reason for each in scan.passes if each.reason), next(iter(lost.values()), ""))
     return "; ".join(said + ([f"{len(lost)} of {n} plots are not reached whole: {reason}"] if lost else []))
 

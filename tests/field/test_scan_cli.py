@@ -67,6 +67,9 @@ def test_the_guides_log_is_in_reach(boom, tmp_path):
     assert [each["speed_m_s"] for each in answer["passes"]] == pytest.approx([0.6, 0.6], abs=0.01)
     assert len(answer["ways"]) == 1
     assert (tmp_path / "m.toml").exists()
+    code, _, error = boom(*map(str, asked), "--payload", "20")
+    assert code == 1
+    assert "2 moves FAIL, the first the pass 2.15 m beside the mount: failed: lower gearbox" in error
 
 
 def test_no_line_in_reach_writes_no_file(boom, tmp_path):
