@@ -72,6 +72,7 @@ PAGES = {
             "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic --speed 0.5 --mission scan.toml",
             "boom scan demos/field/trial.toml --footprint 0.5,0.5 --profile cubic --speed 0.5 --passes 1",
             "boom mission scan.toml",
+            "boom scan demos/field/row.toml --footprint 0.7,0.5 --track demos/field/row.csv --rig demos/field/rig.toml",
         ),
     ),
     "answers-machine": (

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from boom_model import InputError
+from boom_model import InfeasibleError, InputError
 from boom_model.plausible import OFFSET, RATE, Range
 from planner.cli.completion import OneOf, OutFile, any_file
 from planner.cli.options import (
@@ -132,11 +132,13 @@ def _task(footprint: str, figures: dict[str, Any]) -> "ScanTask":
     return ScanTask((along, across), **figures)
 
 
-def _write_scan(files: "Outputs", boom: "Boom", found: "Scan", written: dict[str, str], failed: str) -> None:
+def _write_scan(files: "Outputs", boom: "Boom", found: "Scan | TrackScan", written: dict[str, str], failed: str) -> None:
     """Write the files of a scan by kind."""
     from planner.field.plot_files import write_plots
     from planner.field.plot_picture import map_figure, write_picture
     from planner.field.scan_report import scan_columns, scan_report
+    from planner.field.scan_track import TrackScan
+    from planner.field.scan_track_report import track_columns, track_report
     from planner.reports.document import write_document
 
     place = {kind: files.temporary(name) for kind, name in written.items()}
@@ -145,7 +147,8 @@ def _write_scan(files: "Outputs", boom: "Boom", found: "Scan", written: dict[str
         with open(place["mission"], "w", encoding="utf-8") as file:
             file.write(found.mission)
     if "plots" in place:
-        write_plots(found.plots, place["plots"], scan_columns(found))
+        columns = track_columns(found) if isinstance(found, TrackScan) else scan_columns(found)
+        write_plots(found.plots, place["plots"], columns)
     if "picture" in place:
         write_picture(place["picture"], found.plots, **look)
     if "recording" in place:
@@ -153,7 +156,8 @@ def _write_scan(files: "Outputs", boom: "Boom", found: "Scan", written: dict[str
 
         write_scan_recording(place["recording"], boom, found)
     if "report" in place:
-        write_document(place["report"], scan_report(found, failed), {"The field": map_figure(found.plots, **look)})
+        told = track_report(found, failed) if isinstance(found, TrackScan) else scan_report(found, failed)
+        write_document(place["report"], told, {"The field": map_figure(found.plots, **look)})
 
 
 def _failed(found: "Scan") -> str:
@@ -233,79 +237,68 @@ def _along_log(
 ) -> int:
     """Answer what a scan along a vehicle's log would see."""
     from planner.field.log_files import read_vehicle_log
-    from planner.field.plot_files import write_plots
-    from planner.field.plot_picture import write_picture
     from planner.field.rig import read_rig
     from planner.field.scan_track import scan_along
+    from planner.field.scan_track_report import track_failed
 
     log, rig = given
     if log is None:
         raise InputError("--rig says where the antenna of a log is; give the log by --track")
     asked = {"speed": task.speed, "passes": task.passes, "offset": task.offset}
-    unfit = [name for name in written if name not in ("plots", "picture")]
-    unfit += [name for name, value in asked.items() if value is not None]
-    if unfit:
-        raise InputError(f"--{unfit[0]} does not go with --track: the log gives the track and the speed")
+    for name in (name for name, value in asked.items() if value is not None):
+        raise InputError(f"--{name} does not go with --track: the log gives the track and the speed")
     found = scan_along(boom, field, task, read_vehicle_log(log, None), None if rig is None else read_rig(rig))
-    columns: dict[str, list[Any]] = {
-        "coverage": [round(float(x), 4) for x in found.coverage],
-        "reason": [found.unreachable.get(name, "") for name in field.names],
-    }
+    failed = track_failed(found)
+    if not found.reached and written.keys() & {"mission", "recording"}:
+        raise InfeasibleError(f"{found.source}: no mission and no recording, since no line is reached: {failed}")
     with files:
-        if "plots" in written:
-            write_plots(field, files.temporary(written["plots"]), columns)
-        if "picture" in written:
-            write_picture(files.temporary(written["picture"]), field, coverage=found.coverage, track=found.track)
+        _write_scan(files, boom, found, written, failed)
     if as_json:
-        print_json(_track_json(found, columns, written))
+        print_json(_track_json(found, written))
     else:
         _print_track(found, whole)
         print_files(written)
-        print_lines(
-            "next", ["look at the plots in QGIS"] if "plots" in written else ["add --out plots.geojson --picture scan.png"]
-        )
-    failed = _track_failed(found)
+        print_lines("next", [f"boom mission {written['mission']}" if "mission" in written else "add --mission scan.toml"])
     if failed:
         complain(failed)
     return ANSWER_IS_NO if failed else 0
 
 
-def _track_failed(found: "TrackScan") -> str:
-    fast, lost, n = [each.worst for each in found.passes if each.worst > 1.0], found.unreachable, len(found.plots.names)
-    said = [f"{len(fast)} passes are too fast for the boom, the worst at {max(fast):.2f} of a limit"] if fast else []
-    reason = next((each.reason for each in found.passes if each.reason), next(iter(lost.values()), ""))
-    return "; ".join(said + ([f"{len(lost)} of {n} plots are not reached whole: {reason}"] if lost else []))
-
-
 def _print_track(found: "TrackScan", whole: bool) -> None:
-    rows, n = {each.row for each in found.passes}, len(found.plots.names)
-    print_lines(None, [f"{found.source}: {len(found.passes)} passes along {len(rows)} rows of {found.plots.source}"])
-    seen = int((found.coverage >= 0.99).sum())
-    print_lines(None, [f"{seen} of {n} plots seen to 99 % or more; the vehicle's weaving is taken off"])
-    listed = [
-        (
-            str(each.row), f"{each.line:.2f} m", f"{each.speed:.2f} m/s", f"{each.curve.mount.residual * 1e3:.0f} mm",
-            f"{each.worst:.3f}" if each.ratios else "out of reach",
-        )
-        for each in found.passes
-    ]  # fmt: skip
-    print_rows(("row", "line", "speed", "log's noise", "worst ratio"), listed if whole else listed[:_FEW])
+    from planner.field.scan_track_report import PASSES, pass_cells, track_headline, track_seen
+
+    n = len(found.plots.names)
+    print_lines(None, [track_headline(found), track_seen(found)])
+    listed = [pass_cells(each) for each in found.passes]
+    print_rows(PASSES, listed if whole else listed[:_FEW])
     print_lines(None, [f"{len(listed) - _FEW} more passes: --all lists them"] if len(listed) > _FEW and not whole else [])
-    plots = [(name, f"{share:.1%}") for name, share in zip(found.plots.names, found.coverage, strict=True)]
-    print_rows(("plot", "seen"), plots if whole else plots[:_FEW])
+    plots = [
+        (name, f"{c:.1%}", f"{o:.1f}") for name, c, o in zip(found.plots.names, found.coverage, found.overlap, strict=True)
+    ]
+    print_rows(("plot", "seen", "times"), plots if whole else plots[:_FEW])
     print_lines(None, [f"{n - _FEW} more plots: --all lists them"] if n > _FEW and not whole else [])
     reasons = [f"row {each.row}: {each.reason}" for each in found.passes if each.reason]
     print_lines("note", [*found.notes, *reasons] if whole else found.notes[:_FEW])
 
 
-def _track_json(found: "TrackScan", columns: dict[str, list[Any]], written: dict[str, str]) -> dict[str, Any]:
+def _track_json(found: "TrackScan", written: dict[str, str]) -> dict[str, Any]:
+    from planner.field.scan_track_report import track_columns
+
+    columns = track_columns(found)
     passes = [
         {
             "row": each.row, "line_m": each.line, "begin_s": each.curve.mount.begin, "duration_s": each.curve.mount.duration,
             "speed_m_s": each.speed, "residual_m": each.curve.mount.residual, "reason": each.reason,
+            "verdict": None if each.move is None else str(each.move.report.verdict),
             "ratios": {str(limit): ratio if np.isfinite(ratio) else None for limit, ratio in each.ratios.items()},
         }
         for each in found.passes
     ]  # fmt: skip
     plots = [{"plot": name, **{key: values[k] for key, values in columns.items()}} for k, name in enumerate(found.plots.names)]
-    return {"passes": passes, "plots": plots, "notes": list(found.notes), "files": written}
+    ways = [
+        {"to": way.target, "along": way.along, "duration_s": way.duration, "log_s": way.gap,
+         "verdict": None if way.move is None else str(way.move.report.verdict)}
+        for way in found.ways
+    ]  # fmt: skip
+    day, notes = found.duration, list(found.notes)
+    return {"day_s": day, "passes": passes, "ways": ways, "plots": plots, "notes": notes, "files": written}

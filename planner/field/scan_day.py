@@ -1,5 +1,6 @@
 """The day of a row scan: drives, turns and the boom's moves in time; the same as a mission."""
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -9,8 +10,10 @@ import numpy as np
 
 from boom_model import BaseMotion, Boom, inverse_dynamics
 from boom_model.arrays import Array
+from planner.field.plots import PlotMap
 from planner.field.scan_rows import Beside, Row, length, turn
 from planner.field.scan_task import Leg, ScanTask, Visit, first_line, ground_name, targets_of
+from planner.motion.trajectory import Trajectory
 from planner.planning import Move, plan
 from planner.timing.path_limits import load_ratio
 
@@ -19,7 +22,8 @@ if TYPE_CHECKING:
 
 STARTS = 1.0
 """Assumed acceleration of a vehicle that starts, stops or turns [m/s^2]."""
-_SHORTEST = 0.01  # [s] of a mission's hold
+SHORTEST_HOLD = 0.01
+"""Of a mission [s]."""
 _DIGITS = 9
 _KNOTS = 0.05  # [s] between samples of a motion in a mission file
 
@@ -151,17 +155,30 @@ def mission_text(scan: "Scan") -> str:
     the holds, so that the mission lasts as long as the day.
     """
     task = scan.task
-    lines = [
-        f"# {len(scan.plots.names)} plots of {scan.plots.source}, as boom scan planned them.",
+    how = "with stops" if task.speed is None else f"at {task.speed:g} m/s"
+    lines = mission_head(task, scan.plots, how, sum(bool(visit.lines) for visit in scan.visits))
+    body = _ground_steps(scan) if any(visit.ground for visit in scan.visits) else _line_steps(scan)
+    return "\n".join([*lines, *body, *_step(scan, "transport", line=False)]) + "\n"
+
+
+def mission_head(task: ScanTask, plots: PlotMap, how: str, count: int) -> list[str]:
+    """Return the lines of a mission file before its steps.
+
+    Args:
+        task: of the scan.
+        plots: the map.
+        how: the vehicle drives, in words.
+        count: of plots that the mission covers.
+    """
+    return [
+        f"# {len(plots.names)} plots of {plots.source}, as boom scan planned them.",
         'name = "row scan"',
         'basis = "estimated"',
-        f'source = "boom scan {"with stops" if task.speed is None else f"at {task.speed:g} m/s"}"',
-        f"plots = {sum(bool(visit.lines) for visit in scan.visits)}",
+        f"source = {json.dumps(f'boom scan {how}', ensure_ascii=False)}",
+        f"plots = {count}",
         'start = "transport"',
         f'constraint = "{task.constraint}"',
     ]
-    body = _ground_steps(scan) if any(visit.ground for visit in scan.visits) else _line_steps(scan)
-    return "\n".join([*lines, *body, *_step(scan, "transport", line=False)]) + "\n"
 
 
 def _line_steps(scan: "Scan") -> list[str]:
@@ -172,7 +189,7 @@ def _line_steps(scan: "Scan") -> list[str]:
     blocks = _blocks(scan)
     moved = sum(scan.moves[name].report.duration for leg in scan.legs for name in leg.moves)
     holds = len(blocks) if stopped else sum(leg.what == kind for leg in scan.legs)
-    hold = f"{max((scan.duration - moved) / max(holds, 1), _SHORTEST):.4f}"
+    hold = f"{max((scan.duration - moved) / max(holds, 1), SHORTEST_HOLD):.4f}"
     lines: list[str] = []
     here = ""
     for targets, group in groupby(blocks):
@@ -221,20 +238,25 @@ def _ground_steps(scan: "Scan") -> list[str]:
     }
     done = [(leg.moves[0], " to ".join(forward[leg.moves[0]])) for leg in passed]
     moved = sum(scan.moves[name].report.duration for names in done for name in names)
-    hold = f"{max((scan.duration - moved) / max(len(passed), 1), _SHORTEST):.4f}"
+    hold = f"{max((scan.duration - moved) / max(len(passed), 1), SHORTEST_HOLD):.4f}"
     lines: list[str] = []
     for kind, number, sides in sweeps:
         names = [ground_name(kind, number, side) for side in range(len(sides))]
         count = sum(leg.moves[0] in names for leg in passed)
         each = [
             [
-                *("", "[[steps]]", f"motion = {_samples(scan.moves[name])}"),
+                *("", "[[steps]]", f"motion = {sample_rows(scan.moves[name].trajectory)}"),
                 *_step(scan, forward[name][1], line=True),
                 *("", "[[steps]]", f"hold_s = {hold}"),
             ]
             for name in names
         ]
-        lines += ["", "[[steps]]", f'to = "{_joints(scan.moves[names[0]])}"', f'profile = "{scan.task.profile}"']
+        lines += [
+            "",
+            "[[steps]]",
+            f'to = "{position_words(scan.moves[names[0]].trajectory.q[0])}"',
+            f'profile = "{scan.task.profile}"',
+        ]
         if count >= len(names):
             repeated = [line for steps in each for line in steps]
             lines += ["", "[[steps]]", f"repeat = {count // len(names)}", *(_inner(line) for line in repeated)]
@@ -242,15 +264,15 @@ def _ground_steps(scan: "Scan") -> list[str]:
     return lines
 
 
-def _joints(move: Move) -> str:
-    """Return where a move begins, as a target in degrees and metres."""
-    yaw, inner, lower, extension, wrist = move.trajectory.q[0]
+def position_words(q: Array) -> str:
+    """Return a joint position (5,) as a target in degrees and metres."""
+    yaw, inner, lower, extension, wrist = q
     angles = [f"{np.degrees(x):.10g}" for x in (yaw, inner, lower, wrist)]
     return f"q={','.join(angles[:3])},{extension:.10g},{angles[3]}"
 
 
-def _samples(move: Move) -> str:
-    motion = move.trajectory
+def sample_rows(motion: Trajectory) -> str:
+    """Return a motion as the samples t, q1..q5 of a mission's step."""
     every = max(1, round(_KNOTS / float(motion.t[1] - motion.t[0])))
     at = np.unique(np.append(np.arange(0, len(motion.t), every), len(motion.t) - 1))
     rows = np.column_stack([motion.t[at], motion.q[at]])
@@ -258,7 +280,12 @@ def _samples(move: Move) -> str:
 
 
 def _step(scan: "Scan", target: str, *, line: bool) -> list[str]:
-    return ["", "[[steps]]", f'to = "{target}"', f'profile = "{scan.task.profile}"', *(['along = "line"'] if line else [])]
+    return step_lines(target, scan.task.profile, "line" if line else "joint")
+
+
+def step_lines(target: str, profile: str, along: str = "joint") -> list[str]:
+    """Return the lines of a mission's move to a target."""
+    return ["", "[[steps]]", f'to = "{target}"', f'profile = "{profile}"', *(['along = "line"'] if along == "line" else [])]
 
 
 def _inner(line: str) -> str:

@@ -1,5 +1,6 @@
 """A scan in time: mount, joints, and what the sensor sees, in the plane of the map."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,10 @@ from planner.field.extra import library
 from planner.field.scan import Scan
 from planner.field.scan_day import held
 from planner.field.scan_task import Leg
+from planner.field.scan_track import LEAD, TrackScan
+from planner.motion.trajectory import Trajectory
+
+_Part = tuple[Array, Array, Array, Array, NDArray[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,17 +24,22 @@ class Timeline:
 
     t: Array
     """(n,) [s]"""
-    mount: Array
-    """(n, 2) [m]"""
-    ahead: Array
-    """(n, 2) unit vectors"""
+    place: Array
+    """(n, 3) of the mount: east, north, up [m]"""
+    R: Array
+    """(n, 3, 3) R_enu_mount"""
     q: Array
     """(n, 5)"""
     looking: NDArray[np.bool_]
     """(n,) whether the sensor looks: at a stop, or past plots"""
 
+    @property
+    def mount(self) -> Array:
+        """(n, 2) place of the mount in the plane of the map [m]."""
+        return self.place[:, :2]
+
     def tips(self, boom: Boom) -> Array:
-        """Return the tip (n, 3): east, north, and the height over the mount [m]."""
+        """Return the tip (n, 3): east, north, up [m]."""
         return self._placed(forward_kinematics(boom, self.q).position)
 
     def footprints(self, boom: Boom, size: tuple[float, float]) -> Array:
@@ -42,29 +52,62 @@ class Timeline:
         return np.stack(corners, axis=1)
 
     def _placed(self, points: Array) -> Array:
-        """Return points (n, 3) of the mount's frame in the plane of the map."""
-        left = np.stack([-self.ahead[:, 1], self.ahead[:, 0]], axis=-1)
-        flat: Array = self.mount + points[:, :1] * self.ahead + points[:, 1:2] * left
-        return np.column_stack([flat, points[:, 2]])
+        """Return points (n, 3) of the mount's frame in that of the map."""
+        placed: Array = self.place + np.einsum("nij,nj->ni", self.R, points)
+        return placed
 
 
-def timeline(boom: Boom, scan: Scan, step: float) -> Timeline:
+def timeline(boom: Boom, scan: Scan | TrackScan, step: float) -> Timeline:
     """Return the day of a scan at steps of at most `step` seconds.
 
     Args:
         boom: the boom of the scan.
-        scan: the scan.
+        scan: the scan. One along a log goes from the first pass to the last, at the log's poses.
         step: longest time between two samples [s].
     """
-    begin, parts = 0.0, []
+    parts = list(_along_log(scan, step) if isinstance(scan, TrackScan) else _along_rows(boom, scan, step))
+    t, place, R, q, looking = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return Timeline(t, place, R, q, looking)
+
+
+def _along_rows(boom: Boom, scan: Scan, step: float) -> Iterator[_Part]:
+    begin = 0.0
     for leg in scan.legs:
-        t = np.linspace(0.0, leg.duration, int(np.ceil(leg.duration / step)) + 1)[:-1]
+        t = _times(leg.duration, step)
         mount, ahead = leg.mount(t)
+        R = np.tile(np.eye(3), (len(t), 1, 1))
+        R[:, :2, 0], R[:, 0, 1], R[:, 1, 1] = ahead, -ahead[:, 1], ahead[:, 0]
         looking = np.full(len(t), leg.what in ("stop", "pass"))
-        parts.append((begin + t, mount, ahead, _joints(boom, scan, leg, t), looking))
+        yield begin + t, np.column_stack([mount, np.zeros(len(t))]), R, _joints(boom, scan, leg, t), looking
         begin += leg.duration
-    t, mount, ahead, q, looking = (np.concatenate(columns) for columns in zip(*parts, strict=True))
-    return Timeline(t, mount, ahead, q, looking)
+
+
+def _along_log(scan: TrackScan, step: float) -> Iterator[_Part]:
+    """Yield lead, pass and lead of each pass, and the way to the next; t is 0 at the first lead."""
+    passes = scan.reached
+    for number, each in enumerate(passes):
+        assert each.move is not None
+        begin, end = (at - passes[0].span[0] for at in each.span)
+        for since, duration, looking in (
+            (0.0, LEAD, False), (LEAD, each.curve.mount.duration, True), (LEAD + each.curve.mount.duration, LEAD, False),
+        ):  # fmt: skip
+            t = since + _times(duration, step)
+            yield begin + t, *each.curve.mount.pose(t - LEAD), _at(each.move.trajectory, t), np.full(len(t), looking)
+        if number < len(passes) - 1:
+            way = scan.ways[number]
+            t = _times(way.gap, step)
+            q = np.tile(each.move.trajectory.q[-1], (len(t), 1)) if way.move is None else _at(way.move.trajectory, t)
+            yield end + t, *scan.mount.pose(each.span[1] + t), q, np.zeros(len(t), dtype=bool)
+
+
+def _times(duration: float, step: float) -> Array:
+    """Return times from 0 on, without the end."""
+    return np.linspace(0.0, duration, int(np.ceil(duration / step)) + 1)[:-1]
+
+
+def _at(motion: Trajectory, t: Array) -> Array:
+    """Return joint positions (n, 5) at t (n,) from the begin; after the end the boom holds."""
+    return np.stack([np.interp(t, motion.t, column) for column in motion.q.T], axis=-1)
 
 
 def _joints(boom: Boom, scan: Scan, leg: Leg, t: Array) -> Array:
@@ -76,7 +119,7 @@ def _joints(boom: Boom, scan: Scan, leg: Leg, t: Array) -> Array:
     for name in leg.moves:
         motion = scan.moves[name].trajectory
         later = t >= begin
-        q[later] = np.stack([np.interp(t[later] - begin, motion.t, column) for column in motion.q.T], axis=-1)
+        q[later] = _at(motion, t[later] - begin)
         begin += motion.duration
     return q
 
@@ -91,7 +134,7 @@ class Seen:
     """(m, plots)"""
 
 
-def seen_so_far(boom: Boom, scan: Scan, every: float, spacing: float = 0.05) -> Seen:
+def seen_so_far(boom: Boom, scan: Scan | TrackScan, every: float, spacing: float = 0.05) -> Seen:
     """Return how much of each plot was seen so far, counted on a grid of points.
 
     Args:

@@ -9,37 +9,41 @@ with ground(t) beside the mount on the straight line of the pass, at the scan's 
 mount. The n-th time that the vehicle passes a row, the tip is on the row's n-th line. Motions are
 checked against the limits of joints and drives with the mount's velocity, acceleration and tilt as
 the motion of the base.
+
+Before a pass, the boom comes from rest to its speed: it follows p(t) from half a LEAD before the
+begin, at a rate that grows from 0 to 1 within a LEAD; after the pass, the same the other way round.
+Between two passes the tip goes to its next line (`scan_track_day`), if the log leaves the time.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from boom_model import BaseMotion, Boom, InfeasibleError, InputError, forward_kinematics, inverse_dynamics
+from boom_model import Boom, InfeasibleError, InputError, forward_kinematics, inverse_dynamics
 from boom_model.arrays import Array
 from boom_model.kinematics.constraints import parse_constraint
-from planner.field import attitude
 from planner.field.extra import library
 from planner.field.plots import PlotMap
 from planner.field.rig import Rig
 from planner.field.scan import lines_of
 from planner.field.scan_ground import DOWN
+from planner.field.scan_mount import LoggedMount, MountMotion, fitted, logged_mount
 from planner.field.scan_rows import Row, rows_of
 from planner.field.scan_task import ScanTask
+from planner.field.scan_track_day import SWAY, Way, track_mission, way_between
 from planner.field.vehicle_log import VehicleLog
-from planner.motion.trajectory import STEP, Trajectory, sample
+from planner.motion.planned import PlannedMotion
+from planner.motion.trajectory import STEP, Trajectory
 from planner.paths.clearance import require_path_clear
-from planner.paths.tip_path import TipPath, follow
+from planner.paths.tip_path import follow
+from planner.planning import Move, check_motion
 from planner.timing.limit_ratios import Limit, limit_ratios
 from planner.timing.time_law import Motion, TimeLaw
 
-if TYPE_CHECKING:
-    from scipy.interpolate import BSpline
-
-_KNOT = 1.0  # [s] between knots of the mount's motion
-_BEYOND = 2.0  # [s] of the log on both sides of a pass that are fitted as well
+LEAD = 1.0
+"""Time in which the boom comes to its speed before a pass, and to rest after it [s]."""
 _ALONG = np.cos(np.radians(20.0))  # of the angle between the way driven and the row
 _NEAR, _FAR = 0.5, 3.5  # [m] between the mount and the middle of a row that it passes
 _SMOOTH = 0.5  # [s] before and after a fix, over which its velocity is taken
@@ -50,36 +54,11 @@ _TOLERANCE = 1e-4  # [m] of the tip over the ground
 
 
 @dataclass(frozen=True, eq=False)
-class MountMotion:
-    """Smooth motion of the mount in east, north, up, from a log."""
-
-    spline: "BSpline"
-    """Of the time from the begin: east, north, up [m], roll, pitch, heading [rad]."""
-    begin: float
-    """Of the pass, in the log's time [s]."""
-    duration: float
-    """[s]"""
-    residual: float
-    """Root mean square distance of the fixes from it [m]."""
-
-    def pose(self, t: Array) -> tuple[Array, Array]:
-        """Return positions (..., 3) [m] and R_enu_mount (..., 3, 3) at times t (...)."""
-        values = self.spline(t)
-        return values[..., :3], attitude.rotation(values[..., 3], values[..., 4], values[..., 5])
-
-    def base(self, t: Array) -> BaseMotion:
-        """Return the motion of the base at times t (n,); turn rates by central differences."""
-        h = 1e-3
-        _, R = self.pose(t)
-        rate = _rates(self.pose(t - h)[1], R, self.pose(t + h)[1], h)
-        rates = [_rates(self.pose(at - h)[1], self.pose(at)[1], self.pose(at + h)[1], h) for at in (t - h, t + h)]
-        velocity, acceleration = (np.einsum("nji,nj->ni", R, self.spline(t, order)[:, :3]) for order in (1, 2))
-        return BaseMotion.of(velocity, rate, acceleration, (rates[1] - rates[0]) / (2.0 * h), R[:, 2, :])
-
-
-@dataclass(frozen=True, eq=False)
 class WeavingCurve:
-    """The tip's curve in the mount's frame, over s from 0 to 1, evenly in time."""
+    """The tip's curve in the mount's frame, over s from 0 to 1, evenly in time.
+
+    It goes from half a LEAD before the pass to half a LEAD after it.
+    """
 
     mount: MountMotion
     origin: Array
@@ -91,7 +70,7 @@ class WeavingCurve:
 
     def __call__(self, s: Array) -> Array:
         """Return positions (..., 3) at s (...)."""
-        place, R = self.mount.pose(np.asarray(s, dtype=float) * self.mount.duration)
+        place, R = self.mount.pose(np.asarray(s, dtype=float) * (self.mount.duration + LEAD) - 0.5 * LEAD)
         flat = self.origin + ((place[..., :2] - self.origin) @ self.ahead)[..., None] * self.ahead
         ground = np.concatenate([flat, place[..., 2:] + self.height], axis=-1)
         curve: Array = np.einsum("...ji,...j->...i", R, ground - place)
@@ -111,18 +90,27 @@ class Pass:
     line: float
     """Of the tip, beside the track (mean) [m]."""
     curve: WeavingCurve
-    path: TipPath | None
+    move: Move | None
+    """Of the boom from rest to rest, checked on level ground; None where the tip does not reach the
+    line, or is not there in time."""
     trajectory: Trajectory | None
-    """Of the boom; None where the tip does not reach the line."""
+    """The part of it on the line, from the begin of the pass on."""
     reason: str
     ratios: dict[Limit, float]
-    """Largest demand over limit, with the mount's motion."""
+    """Largest demand over limit from rest to rest, with the mount's motion."""
+    late: bool = False
+    """Whether the boom is not there in time."""
 
     @property
     def speed(self) -> float:
         """Mean of the vehicle [m/s]."""
         places = self.curve.mount.pose(np.array([0.0, self.curve.mount.duration]))[0]
         return float(np.linalg.norm(np.diff(places[:, :2], axis=0)) / self.curve.mount.duration)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """From rest to rest, in the log's time [s]."""
+        return self.curve.mount.begin - LEAD, self.curve.mount.begin + self.curve.mount.duration + LEAD
 
     @property
     def worst(self) -> float:
@@ -138,26 +126,63 @@ class TrackScan:
     plots: PlotMap
     source: str
     passes: tuple[Pass, ...]
+    ways: tuple[Way, ...]
+    """Between those passes whose line is reached."""
     lines: dict[int, int]
     """Lines that each row takes."""
     footprints: tuple[Array, ...]
     """Of each pass, corners (n, 4, 2) in the plane of the map [m]."""
-    track: Array
-    """(n, 2) of the mount [m]"""
+    mount: LoggedMount
     notes: tuple[str, ...]
 
+    @property
+    def track(self) -> Array:
+        """(n, 2) of the mount [m]."""
+        return self.mount.place[:, :2]
+
+    @property
+    def reached(self) -> tuple[Pass, ...]:
+        """Passes whose line is reached."""
+        return tuple(each for each in self.passes if each.move is not None)
+
+    @property
+    def duration(self) -> float:
+        """From the begin of the first pass to the end of the last, both at rest [s]."""
+        reached = self.reached
+        return reached[-1].span[1] - reached[0].span[0] if reached else 0.0
+
     @cached_property
+    def mission(self) -> str:
+        """The passes as a mission file's text.
+
+        Raises:
+            InfeasibleError: no line is reached.
+        """
+        return track_mission(self)
+
+    @property
     def coverage(self) -> Array:
         """(plots,) share of each plot that is seen."""
+        return self._looks[0]
+
+    @property
+    def overlap(self) -> Array:
+        """(plots,) area seen over that seen at least once; 0 where nothing is."""
+        return self._looks[1]
+
+    @cached_property
+    def _looks(self) -> tuple[Array, Array]:
         shapely = library("shapely")
-        shares = np.zeros(len(self.plots.names))
+        shares, times = np.zeros((2, len(self.plots.names)))
         if not any(len(each) for each in self.footprints):
-            return shares
+            return shares, times
         shapes = shapely.polygons(np.concatenate([each for each in self.footprints if len(each)]))
         for k, touched in _by_plot(self.plots, shapes).items():
             polygon = self.plots.polygons[k]
-            shares[k] = shapely.intersection(shapely.union_all(shapes[touched]), polygon).area / polygon.area
-        return shares
+            pieces = shapely.intersection(shapes[touched], polygon)
+            seen = shapely.union_all(pieces).area
+            shares[k], times[k] = seen / polygon.area, shapely.area(pieces).sum() / max(seen, 1e-12)
+        return shares, times
 
     @property
     def unreachable(self) -> dict[str, str]:
@@ -188,43 +213,50 @@ def scan_along(boom: Boom, plots: PlotMap, task: ScanTask, log: VehicleLog, rig:
         InputError: the map has no rows, or the log passes none of them.
     """
     rows = rows_of(plots)
-    place, angles = _mount_of(log, plots, rig)
+    mount = logged_mount(log, plots, rig)
     passes: list[Pass] = []
+    ways: list[Way] = []
     counts: dict[int, int] = {}
-    for row, first, last in _ways(rows, place, log):
+    last: Pass | None = None
+    gaps: list[str] = []
+    for row, first, end in _ways(rows, mount):
+        gap = mount.gap(mount.t[first] - LEAD, mount.t[end] + LEAD)
+        if gap is not None:
+            why = f"no fix for {gap[1]:.1f} s from {gap[0]:.10g} s on"
+            gaps.append(f"{log.source}: {why}; that pass along row {row.number} is left out")
+            continue
         lines = lines_of(row, task)
         number = counts.get(row.number, 0)
         if number >= len(lines):
             continue
         counts[row.number] = number + 1
-        mount = _fitted(log.t, place, angles, first, last)
-        passes.append(_pass(boom, task, row, float(lines[number]), mount))
+        here = None if last is None or last.move is None else last.move.trajectory.q[-1]
+        each = _pass(boom, task, row, float(lines[number]), fitted(mount, first, end), here)
+        if last is not None and each.move is not None:
+            way, late = _joined(boom, task, last, each)
+            each = each if not late else replace(each, move=None, trajectory=None, ratios={}, reason=late, late=True)
+            ways += [way] if way is not None else []
+        last = last if each.move is None else each
+        passes.append(each)
     if not passes:
-        raise InputError(f"{log.source}: it passes no row of {plots.source} on its left, {_NEAR:g} to {_FAR:g} m away")
+        missed = f"{log.source}: it passes no row of {plots.source} on its left, {_NEAR:g} to {_FAR:g} m away"
+        raise InputError("; ".join([missed, *gaps]))
     notes = () if rig is not None else (f"{log.source}: taken as the mount's own position and attitude (assumed; --rig)",)
     prints = tuple(_prints(boom, task, each) for each in passes)
     return TrackScan(
-        task, plots, log.source, tuple(passes), {row.number: len(lines_of(row, task)) for row in rows}, prints, place[:, :2],
-        (*notes, *log.notes, *log.warnings),
+        task, plots, log.source, tuple(passes), tuple(ways), {row.number: len(lines_of(row, task)) for row in rows}, prints,
+        mount, (*gaps, *notes, SWAY, *log.notes, *log.warnings),
     )  # fmt: skip
 
 
-def _mount_of(log: VehicleLog, plots: PlotMap, rig: Rig | None) -> tuple[Array, Array]:
-    """Return the mount's places (n, 3) in the map's frame and its roll, pitch, heading (n, 3)."""
-    R_ecef_body = log.R_ecef_body if rig is None else log.R_ecef_body @ rig.R_body_imu.T
-    lever = np.zeros(3) if rig is None else rig.mount - rig.antenna
-    R_body_mount = np.eye(3) if rig is None else rig.R_body_mount
-    place = plots.frame.enu(log.ecef + R_ecef_body @ lever)
-    R = np.einsum("ji,njk->nik", plots.frame.R_ecef_enu, R_ecef_body @ R_body_mount)
-    return place, np.unwrap(attitude.angles(R), axis=0)
-
-
-def _ways(rows: tuple[Row, ...], place: Array, log: VehicleLog) -> list[tuple[Row, int, int]]:
+def _ways(rows: tuple[Row, ...], mount: LoggedMount) -> list[tuple[Row, int, int]]:
     """Return the first and the last fix of each way past a row on the left, in order of time."""
-    times = [np.clip(log.t + dt, log.t[0], log.t[-1]) for dt in (-_SMOOTH, _SMOOTH)]
-    ends = [np.stack([np.interp(t, log.t, column) for column in place[:, :2].T], axis=-1) for t in times]
+    place = mount.place
+    times = [np.clip(mount.t + dt, mount.t[0], mount.t[-1]) for dt in (-_SMOOTH, _SMOOTH)]
+    ends = [np.stack([np.interp(t, mount.t, column) for column in place[:, :2].T], axis=-1) for t in times]
     velocity = (ends[1] - ends[0]) / (times[1] - times[0])[:, None]
     speed = np.linalg.norm(velocity, axis=1)
+    led = (mount.t >= mount.t[0] + LEAD) & (mount.t <= mount.t[-1] - LEAD)
     found = []
     for row in rows:
         away = place[:, :2] - row.middle
@@ -233,7 +265,7 @@ def _ways(rows: tuple[Row, ...], place: Array, log: VehicleLog) -> list[tuple[Ro
         left = np.sign(cosine) * -across
         low, high = row.span
         inside = (along >= low) & (along <= high) & (np.abs(cosine) > _ALONG) & (speed > _SLOWEST)
-        inside &= (left > _NEAR) & (left < _FAR)
+        inside &= (left > _NEAR) & (left < _FAR) & led
         edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(int)))
         found += [(row, int(a), int(b) - 1) for a, b in edges.reshape(-1, 2) if b - a >= _FEWEST]
     nearest: dict[tuple[int, int], tuple[float, Row]] = {}
@@ -247,36 +279,56 @@ def _ways(rows: tuple[Row, ...], place: Array, log: VehicleLog) -> list[tuple[Ro
     return sorted(((row, first, last) for (first, last), (_, row) in nearest.items()), key=lambda way: way[1])
 
 
-def _fitted(t: Array, place: Array, angles: Array, first: int, last: int) -> MountMotion:
-    """Return the smooth motion of the mount between two fixes."""
-    from scipy.interpolate import make_lsq_spline
-
-    a = int(np.searchsorted(t, t[first] - _BEYOND))
-    b = int(np.searchsorted(t, t[last] + _BEYOND, side="right"))
-    since, values = t[a:b] - t[first], np.column_stack([place[a:b], angles[a:b]])
-    inner = np.linspace(since[0], since[-1], max(2, int((since[-1] - since[0]) / _KNOT)))[1:-1]
-    knots = np.concatenate([[since[0]] * 6, inner, [since[-1]] * 6])
-    spline = make_lsq_spline(since, values, knots, k=5)
-    off = np.linalg.norm(spline(since)[:, :3] - values[:, :3], axis=1)
-    return MountMotion(spline, float(t[first]), float(t[last] - t[first]), float(np.sqrt((off**2).mean())))
-
-
-def _pass(boom: Boom, task: ScanTask, row: Row, line: float, mount: MountMotion) -> Pass:
+def _pass(boom: Boom, task: ScanTask, row: Row, line: float, mount: MountMotion, here: Array | None) -> Pass:
     origin = row.middle + line * row.left
     curve = WeavingCurve(mount, origin, row.ahead, task.tip_height)
     beside = float(curve(np.linspace(0.0, 1.0, 50))[:, 1].mean())
     try:
-        path = follow(boom, curve, DOWN, parse_constraint(task.constraint), tolerance=_TOLERANCE)
+        path = follow(boom, curve, DOWN, parse_constraint(task.constraint), here, tolerance=_TOLERANCE)
         require_path_clear(boom, path)
     except InfeasibleError as error:
         why = str(error).partition(": ")[0]
         return Pass(row.number, beside, curve, None, None, f"on the line {beside:.2f} m beside the mount, {why}", {})
-    law = TimeLaw.from_pieces([mount.duration], [[1.0 / mount.duration], [0.0]], jerk_limited=True)
-    motion = sample(Motion(path, law), STEP)
-    base = mount.base(motion.t)
-    tau = inverse_dynamics(boom, motion.q, motion.qd, motion.qdd, base=base, friction=True, reactions=False).tau
-    found = limit_ratios(boom, motion.q, motion.qd, motion.qdd, motion.qddd, tau)
-    return Pass(row.number, beside, curve, path, motion, "", {limit: float(ratio.max()) for limit, ratio in found.items()})
+    motion = Motion(path, _eased(mount.duration))
+    planned = PlannedMotion((motion,), path(0.0), STEP, (f"the tip stays on a line along row {row.number} over the ground",))
+    move = check_motion(boom, planned.trajectory, profile="pass along the log")
+    t = np.linspace(0.0, mount.duration, int(np.ceil(mount.duration / STEP)) + 1)
+    whole = move.trajectory
+    base = mount.base(whole.t - LEAD)
+    tau = inverse_dynamics(boom, whole.q, whole.qd, whole.qdd, base=base, friction=True, reactions=False).tau
+    found = limit_ratios(boom, whole.q, whole.qd, whole.qdd, whole.qddd, tau)
+    ratios = {limit: float(ratio.max()) for limit, ratio in found.items()}
+    return Pass(row.number, beside, curve, move, Trajectory.from_samples(t, *motion(t + LEAD)), "", ratios)
+
+
+def _eased(duration: float) -> TimeLaw:
+    """Return the time law of a pass: rate 3 x^2 - 2 x^3, x = t / LEAD, then 1, then back to 0."""
+    T = LEAD
+    pieces = np.array(
+        [
+            [-0.5 / T**3, 0.0, 0.5 / T**3],
+            [1.0 / T**2, 0.0, -1.0 / T**2],
+            [0.0, 0.0, 0.0],
+            [0.0, 1.0, 1.0],
+            [0.0, 0.5 * T, 0.5 * T + duration],
+        ]
+    )
+    return TimeLaw.from_pieces([T, duration, T], pieces / (duration + T), jerk_limited=True)
+
+
+def _joined(boom: Boom, task: ScanTask, last: Pass, each: Pass) -> tuple[Way | None, str]:
+    """Return the way from one pass to the next, or why the boom is not there in time."""
+    assert last.move is not None
+    assert each.move is not None
+    gap = each.span[0] - last.span[1]
+    try:
+        way = way_between(boom, task, last.move.trajectory.q[-1], each.move.trajectory.q[0], gap)
+    except InfeasibleError as error:
+        return None, f"the tip cannot go to the line {each.line:.2f} m beside the mount: {error}"
+    if way.duration > gap:
+        takes = f"the tip takes {way.duration:.1f} s to the line {each.line:.2f} m beside the mount"
+        return None, f"{takes}; the log leaves {max(gap, 0.0):.1f} s"
+    return way, ""
 
 
 def _prints(boom: Boom, task: ScanTask, each: Pass) -> Array:
@@ -297,12 +349,3 @@ def _prints(boom: Boom, task: ScanTask, each: Pass) -> Array:
 def _by_plot(plots: PlotMap, shapes: Any) -> dict[int, Array]:
     which, touched = plots.tree.query(shapes, predicate="intersects")
     return {int(k): which[touched == k] for k in np.unique(touched)}
-
-
-def _rates(before: Array, now: Array, after: Array, h: float) -> Array:
-    """Return the angular velocity (n, 3) in the body's axes, from turns at t - h, t and t + h."""
-    skew = np.einsum("nji,njk->nik", now, (after - before) / (2.0 * h))
-    rate: Array = 0.5 * np.stack(
-        [skew[:, 2, 1] - skew[:, 1, 2], skew[:, 0, 2] - skew[:, 2, 0], skew[:, 1, 0] - skew[:, 0, 1]], axis=-1
-    )
-    return rate

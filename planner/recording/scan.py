@@ -14,6 +14,8 @@ from planner.field.plots import PlotMap
 from planner.field.scan import Scan
 from planner.field.scan_report import assumptions, day_line, headline, pass_lines, scan_report, seen_line
 from planner.field.scan_timeline import Timeline, seen_so_far, timeline
+from planner.field.scan_track import TrackScan
+from planner.field.scan_track_report import track_headline, track_report, track_seen
 from planner.recording.layout import eye_on, scene, shown_beside, text
 from planner.recording.legend import legend_view, log_legend
 from planner.recording.palette import GREY, LIGHT, VERMILION, Color
@@ -31,8 +33,8 @@ _ZOOM = 19.5  # some 200 m across
 _SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
-def write_scan_recording(path: str | Path, boom: Boom, scan: Scan) -> None:
-    """Write the day of a scan in east, north, up [m], and a map that needs no network.
+def write_scan_recording(path: str | Path, boom: Boom, scan: Scan | TrackScan) -> None:
+    """Write a scan of rows, or along a log, in east, north, up [m], and a map without network.
 
     /answer, /report             what was asked and found
     /world/mount, /world/boom    the vehicle and the boom
@@ -43,7 +45,7 @@ def write_scan_recording(path: str | Path, boom: Boom, scan: Scan) -> None:
     Args:
         path: the .rrd file.
         boom: the boom of the scan.
-        scan: the scan.
+        scan: the scan; of one along a log, a line must be reached.
 
     Raises:
         InputError: the file cannot be written. An existing file is left unchanged.
@@ -53,8 +55,8 @@ def write_scan_recording(path: str | Path, boom: Boom, scan: Scan) -> None:
 
     def log(recording: rr.RecordingStream) -> None:
         recording.send_blueprint(_blueprint(line))
-        log_markdown(recording, "answer", _answer(scan))
-        log_markdown(recording, "report", scan_report(scan))
+        log_markdown(recording, "answer", "\n\n".join([*_answer(scan), *_reading(scan.plots)]))
+        log_markdown(recording, "report", track_report(scan) if isinstance(scan, TrackScan) else scan_report(scan))
         log_legend(recording, [(f"{share:.0%}", _color(share)) for share in _SHARES])
         log_mount_poses(recording, line.t, _poses(line))
         log_solids(recording, boom)
@@ -83,22 +85,35 @@ def _blueprint(line: Timeline) -> rrb.Blueprint:
     return shown_beside(view, beside, [3, 2])
 
 
-def _answer(scan: Scan) -> str:
+def _answer(scan: Scan | TrackScan) -> list[str]:
     lost = [f"{name}: {why}" for name, why in scan.unreachable.items()]
-    frame = scan.plots.frame
-    place = f"{np.degrees(frame.latitude):.7f}, {np.degrees(frame.longitude):.7f} deg"
-    lines = [
+    missing = [f"{len(lost)} plots are not reached whole. {lost[0]}." for _ in lost[:1]]
+    if isinstance(scan, TrackScan):
+        height = "Heights of the mount are those of the log, from their mean on."
+        return [
+            f"**{track_seen(scan)}.**",
+            f"{track_headline(scan)}.",
+            *missing,
+            *(f"Note: {note}." for note in scan.notes),
+            height,
+        ]
+    return [
         f"**{seen_line(scan)}.**",
         f"{headline(scan)}.",
         f"{day_line(scan)}.",
         *pass_lines(scan),
-        *(f"{len(lost)} plots are not reached whole. {lost[0]}." for _ in lost[:1]),
+        *missing,
         f"Assumed: {assumptions(scan)[0]}.",
+    ]
+
+
+def _reading(plots: PlotMap) -> list[str]:
+    place = f"{np.degrees(plots.frame.latitude):.7f}, {np.degrees(plots.frame.longitude):.7f} deg"
+    return [
         f"The view is in metres from {place}. Plots are coloured by the share seen so far. Vehicle and height of the mount "
         "are for display only.",
         "The tab *Map* shows the same on the earth. Its background needs a network; plots and track do not.",
     ]
-    return "\n\n".join(lines)
 
 
 def _color(share: float) -> Color:
@@ -107,15 +122,14 @@ def _color(share: float) -> Color:
 
 
 def _poses(line: Timeline) -> Array:
-    """Return T_field_1 (n, 4, 4)."""
+    """Return T_field_1 (n, 4, 4), with the mean of the heights at that of the display."""
     T = np.tile(np.eye(4), (len(line.t), 1, 1))
-    T[:, :2, 0] = line.ahead
-    T[:, 0, 1], T[:, 1, 1] = -line.ahead[:, 1], line.ahead[:, 0]
-    T[:, :2, 3], T[:, 2, 3] = line.mount, _MOUNT
+    T[:, :3, :3], T[:, :2, 3] = line.R, line.mount
+    T[:, 2, 3] = _MOUNT + line.place[:, 2] - line.place[:, 2].mean()
     return T
 
 
-def _log_footprint(recording: rr.RecordingStream, boom: Boom, scan: Scan, line: Timeline) -> None:
+def _log_footprint(recording: rr.RecordingStream, boom: Boom, scan: Scan | TrackScan, line: Timeline) -> None:
     corners = line.footprints(boom, scan.task.footprint)
     rings = np.concatenate([corners, corners[:, :1]], axis=1)
     rings = np.concatenate([rings, np.full((*rings.shape[:2], 1), _SPOT)], axis=-1)

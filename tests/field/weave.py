@@ -12,9 +12,13 @@ SPEED, BACK, BEYOND, OFFSET = 0.5, 1.0, 1.5, 1.9
 
 
 class Weave:
-    """A vehicle that passes the first row three times, weaving by 5 cm, and drives back."""
+    """A vehicle that passes the first row three times, weaving by 5 cm, and drives back.
 
-    def __init__(self, passes=3):
+    With a sway of 0 it goes straight and level.
+    """
+
+    def __init__(self, passes=3, sway=1.0):
+        self.sway = sway
         self.plots = trial()[0]
         self.row = rows_of(self.plots)[0]
         low, high = self.row.span
@@ -30,12 +34,12 @@ class Weave:
     def pose(self, t):
         """Places (n, 3) of the mount and R_enu_mount (n, 3, 3)."""
         w = 2.0 * np.pi / 8.0
-        across = -OFFSET + 0.05 * np.sin(w * t)
+        across = -OFFSET + 0.05 * self.sway * np.sin(w * t)
         flat = self.row.middle + self.along(t)[:, None] * self.row.ahead + across[:, None] * self.row.left
-        east = np.arctan2(self.row.ahead[1], self.row.ahead[0]) + 0.08 * np.cos(w * t)
+        east = np.arctan2(self.row.ahead[1], self.row.ahead[0]) + 0.08 * self.sway * np.cos(w * t)
         heading = np.pi / 2.0 - east
-        R = attitude.rotation(0.02 * np.sin(1.1 * t), 0.015 * np.cos(0.9 * t), heading)
-        return np.column_stack([flat, 0.02 * np.sin(0.7 * t)]), R
+        R = attitude.rotation(0.02 * self.sway * np.sin(1.1 * t), 0.015 * self.sway * np.cos(0.9 * t), heading)
+        return np.column_stack([flat, 0.02 * self.sway * np.sin(0.7 * t)]), R
 
     def log(self, noise=0.0, lever=(0.0, 0.0, 0.0), R_mount_imu=None):
         place, R = self.pose(self.t)
