@@ -39,6 +39,7 @@ class Browser:
 
     def __init__(self, address: str, folder: Path, size: tuple[int, int] = (1280, 720)) -> None:
         from selenium import webdriver
+        from selenium.common.exceptions import StaleElementReferenceException
         from selenium.webdriver.chrome.service import Service
 
         chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
@@ -56,8 +57,9 @@ class Browser:
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
         self.driver.get(address)
         self.until(lambda: self.text("tip_x"))
-        for close in self.driver.find_elements("css selector", ".mantine-Notification-closeButton"):  # of the software renderer
-            close.click()
+        with suppress(StaleElementReferenceException):  # a notification of the software renderer, which may go by itself
+            for close in self.driver.find_elements("css selector", ".mantine-Notification-closeButton"):
+                close.click()
 
     def until(self, holds, seconds: float = 60.0):
         """What holds, as soon as it does."""
@@ -180,9 +182,13 @@ def test_a_target_is_typed_and_an_unreachable_one_is_refused_beside_its_field(pa
     browser.type("tip x [m]", "3.4")
     browser.until(lambda: "only outside the limits" in (browser.text("complaint-x") or ""))
     assert browser.text("tip_x") == "1.4000"
-    said = browser.driver.find_element("id", "complaint-x").rect
-    typed = browser.field("tip x [m]").rect
-    assert 0 <= said["y"] - typed["y"] - typed["height"] < 20
+
+    def is_below_its_field() -> bool:
+        said = browser.driver.find_element("id", "complaint-x").rect
+        typed = browser.field("tip x [m]").rect
+        return 0 <= said["y"] - typed["y"] - typed["height"] < 20
+
+    browser.until(is_below_its_field)
 
 
 def test_plan_play_and_save_as_the_command_does(page, browser, boom):
@@ -243,10 +249,12 @@ def test_it_works_on_a_tablet(page, tmp_path):
     tablet = Browser(page.address, tmp_path, (820, 1180))
     try:
         assert tablet.driver.execute_script("return document.documentElement.scrollWidth") <= 820
-        results = tablet.until(
-            lambda: [e for e in tablet.driver.find_elements("css selector", "[role=tab]") if e.text == "Loads"]
-        )
-        assert results[0].rect["x"] < 400  # below the fields, so that the scene keeps more than half of the width
+
+        def places() -> list[float]:
+            tabs = tablet.driver.find_elements("css selector", "[role=tab]")
+            return [tab.rect["x"] for tab in tabs if tab.text == "Loads"]
+
+        assert tablet.until(places)[0] < 400  # below the fields, so that the scene keeps more than half of the width
         tablet.type("payload [kg]", "3")
         tablet.until(lambda: session(page).state.boom.payload.mass == 3.0)
     finally:
