@@ -363,6 +363,11 @@ class Boom:
         changed = Body(mass, old.com, read_only(old.inertia * (mass / old.mass)))
         return replace(self, bodies=MappingProxyType({**self.bodies, name: changed}))
 
+    def drive_of(self, joint: str) -> Drive | LinearDrive | None:
+        """Return what drives a joint: motor and gearbox, or the extension's actuator."""
+        i = JOINTS.index(joint)
+        return self.drives[i] or (self.actuator if IS_LENGTH[i] else None)
+
     def with_drive(self, joint: str, drive: Drive | LinearDrive | None) -> "Boom":
         """Return the boom with another drive on a joint. The masses of the bodies stay unchanged.
 

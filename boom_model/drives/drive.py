@@ -151,6 +151,11 @@ class Drive:
     """Measured inertia of motor and gearbox at the joint [kg m^2]; None uses the datasheets."""
 
     @property
+    def name(self) -> str:
+        """Names of motor and gearbox."""
+        return f"{self.motor.name} + {self.gearbox.name}"
+
+    @property
     def winding(self) -> Winding | None:
         """Data of the motor in the chosen wiring; None if the wiring or its data is unknown."""
         return None if self.wiring is None else self.motor.windings.get(self.wiring.value)

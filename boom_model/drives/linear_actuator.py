@@ -47,6 +47,11 @@ class LinearDrive:
     brake: Sourced[bool] | None = None
     """Whether a brake holds it without power; None if unknown."""
 
+    @property
+    def name(self) -> str:
+        """Name of the actuator."""
+        return self.actuator.name
+
 
 def screw_torque(actuator: LinearActuator, force: ArrayLike, speed: ArrayLike) -> Array | None:
     """Return the torque at the screw [Nm] for a force [N] and a speed [m/s], which broadcast.

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import click
 import numpy as np
 
-from boom_model import JOINTS, Boom, Catalogue, Drive, Gearbox, LinearActuator, Motor, forward_kinematics
+from boom_model import JOINTS, Boom, Catalogue, Gearbox, LinearActuator, Motor, forward_kinematics
 from boom_model.boom import IS_LENGTH
 from boom_model.measured import measured_lines
 from boom_model.provenance import Basis, Origin
@@ -41,7 +41,7 @@ def info(boom_file: str | None, as_json: bool) -> int:
     rows = []
     for i, joint in enumerate(JOINTS):
         low, high, speed, push, jerk = (_shown(i, value) for value in _limits(boom, i))
-        rows.append((joint, f"{low} to {high} {'m' if IS_LENGTH[i] else 'deg'}", speed, push, jerk, _drive(boom, i)))
+        rows.append((joint, f"{low} to {high} {'m' if IS_LENGTH[i] else 'deg'}", speed, push, jerk, _drive(boom, joint)))
     print_rows(("joint", "range", "speed/s", "acc/s2", "jerk/s3", "drive"), rows, drop=("jerk/s3",))
     print_lines(None, [f"basis of speeds, accelerations and jerks: {', '.join(_bases(boom))}"])
     print_lines("measured", _measured(boom))
@@ -197,14 +197,6 @@ def _bases(boom: Boom) -> list[str]:
     return [f"{count} {basis}" for basis, count in counted.items() if count]
 
 
-def _drive(boom: Boom, joint: int) -> str:
-    drive = boom.drives[joint]
-    if isinstance(drive, Drive):
-        return f"{drive.motor.name} + {drive.gearbox.name}"
-    actuator = boom.actuator if IS_LENGTH[joint] else None
-    return "none" if actuator is None else actuator.actuator.name
-
-
 def _pose(boom: Boom, name: str) -> str:
     return ", ".join(f"{joint} {_shown(i, boom.poses[name][i])}" for i, joint in enumerate(JOINTS))
 
@@ -223,7 +215,7 @@ def _info(boom: Boom) -> dict[str, Any]:
                 "joint": joint,
                 **dict(zip(keys, _limits(boom, i), strict=True)),
                 "origins": {rank: _origin(boom.limits.origins[rank][i]) for rank in _RANKS},
-                "drive": _drive(boom, i),
+                "drive": _drive(boom, joint),
             }
             for i, joint in enumerate(JOINTS)
         ],
@@ -239,3 +231,8 @@ def _plain(entry: Any) -> dict[str, Any]:
     """Return the fields of an entry in SI, with windings as tables."""
     values = {field.name: getattr(entry, field.name) for field in fields(entry)}
     return {name: _plain(value) if hasattr(value, "__dataclass_fields__") else value for name, value in values.items()}
+
+
+def _drive(boom: Boom, joint: str) -> str:
+    drive = boom.drive_of(joint)
+    return "none" if drive is None else drive.name

@@ -20,10 +20,8 @@ def offered(catalogue: Catalogue, joint: str) -> tuple[str, ...]:
 
 def fitted(boom: Boom, joint: str) -> str:
     """Return the name of a joint's drive."""
-    drive = boom.drives[JOINTS.index(joint)]
-    if drive is not None:
-        return f"{drive.motor.name}{_BETWEEN}{drive.gearbox.name}"
-    return boom.actuator.actuator.name if boom.actuator is not None and IS_LENGTH[JOINTS.index(joint)] else NONE
+    drive = boom.drive_of(joint)
+    return NONE if drive is None else drive.name
 
 
 def with_drive(boom: Boom, catalogue: Catalogue, joint: str, name: str, supplies: Mapping[str, Drive]) -> Boom:

@@ -122,9 +122,7 @@ class Judged:
     @property
     def name(self) -> str:
         """Names of motor and gearbox, or of the actuator."""
-        if isinstance(self.drive, LinearDrive):
-            return self.drive.actuator.name
-        return f"{self.drive.motor.name} + {self.drive.gearbox.name}"
+        return self.drive.name
 
     @property
     def supply(self) -> str:

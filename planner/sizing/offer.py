@@ -52,9 +52,7 @@ class Offer:
     @property
     def name(self) -> str:
         """Names of motor and gearbox, or of the actuator."""
-        if isinstance(self.drive, LinearDrive):
-            return self.drive.actuator.name
-        return f"{self.drive.motor.name} + {self.drive.gearbox.name}"
+        return self.drive.name
 
     @property
     def short(self) -> tuple[Shortfall, ...]:

@@ -222,7 +222,7 @@ def _requirement(
     tip_error: float | None,
     backlash: float | None,
 ) -> Requirement:
-    duty, i = cycle.duty, view.index
+    duty, i, fitted = cycle.duty, view.index, boom.drive_of(view.joint)
     cloud = _cloud(view)
     speed = np.abs(view.qd)
     back = view.tau - 2.0 * view.friction if view.steady else view.tau  # friction changes its sign
@@ -238,7 +238,7 @@ def _requirement(
     return Requirement(
         joint=view.joint,
         is_length=view.is_length,
-        fitted=_fitted(boom, i, view.is_length),
+        fitted=None if fitted is None else fitted.name,
         cloud=cloud,
         steps=_steps(cloud, creep),
         peak=peak,
@@ -266,13 +266,6 @@ def _requirement(
         cycle_s=duty.duration,
         life_s=None if duty.required_life is None else duty.required_life.value,
     )
-
-
-def _fitted(boom: Boom, i: int, is_length: bool) -> str | None:
-    drive = boom.drives[i]
-    if drive is not None:
-        return f"{drive.motor.name} + {drive.gearbox.name}"
-    return boom.actuator.actuator.name if is_length and boom.actuator is not None else None
 
 
 def _point(view: JointView, torque: Array, *, still: bool = False) -> Point:
